@@ -139,11 +139,7 @@ def test_parts_work_in_python(scene: Path) -> None:
         ('"level"\n', '"levle"\n', "'levle' is not known; did you mean 'level'?"),
         ("part = 0.25", "parts = 0.25", "[controller] rule of kind 'share': unknown key 'parts'"),
         ("every = 2", "every = 2.5", "[output] exports, entry 1 of kind '.track': every is 2.5"),
-        (
-            '"block.track"',
-            '"block.trak"',
-            "nothing writes '.trak' files. End it with one of .abc",
-        ),
+        ('"block.track"', '"block.trak"', "nothing writes '.trak' files. End it with one of .abc"),
         ('"level.py"', '"no.py"', "plugins 1: file "),
         ('"level.py"', '"level.txt"', "plugins 1: 'level.txt' is no Python module"),
         ('"level.py"', '"broken.py"', "plugin 'broken.py' failed in broken.py, line 2 (ZeroDiv"),

@@ -13,9 +13,7 @@ SOURCE = Path(flowborne.__file__).parent
 MOST = 8
 """Parameters of a function, `self` and `cls` aside; what belongs together comes as one."""
 
-LONGER = {
-    "coupling/solve.py solve_together": 9,
-}
+LONGER = {"coupling/solve.py solve_together": 9}
 """Those that still have more, and how many; nothing is added here."""
 
 

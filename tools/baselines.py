@@ -226,10 +226,7 @@ TASKS = {
         "speed, m/s",
     ),
     "walker": Task(
-        {
-            "wind of 8 m/s": {},
-            "wind of 12 m/s": {"wind.0.velocity": "[-12.0, 0.0, 0.0]"},
-        },
+        {"wind of 8 m/s": {}, "wind of 12 m/s": {"wind.0.velocity": "[-12.0, 0.0, 0.0]"}},
         1,
         WALKER,
         strides,

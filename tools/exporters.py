@@ -21,17 +21,7 @@ import flowborne as fb
 from flowborne.formats.creature import Creature
 from flowborne.runs.states import cell_velocity, cell_vorticity
 from marked import with_part
-from read_back import (
-    Alembic,
-    Bvh,
-    Gltf,
-    Stage,
-    VtkHdf,
-    cells_of,
-    grids_of,
-    meshes_of,
-    points_of,
-)
+from read_back import Alembic, Bvh, Gltf, Stage, VtkHdf, cells_of, grids_of, meshes_of, points_of
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "exporters.md"

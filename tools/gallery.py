@@ -87,10 +87,7 @@ OPEN, FLYERS, ROBOTS = "Open water and open air", "Flyers", "Swimming robots"
 GROUPS = (
     Group(OPEN, lambda scene: followed_by(scene) and scene.dimensions == 2, 300),
     Group(
-        OPEN,
-        lambda scene: followed_by(scene) and has_gas(scene),
-        320,
-        {"domain.resolution": "36"},
+        OPEN, lambda scene: followed_by(scene) and has_gas(scene), 320, {"domain.resolution": "36"}
     ),
     Group(
         OPEN,

@@ -113,14 +113,7 @@ __all__ = [
     "worlds",
 ]
 
-PAGES = (
-    "parts",
-    "bodies",
-    "play.gym",
-    "machine",
-    "pictures",
-    "worlds",
-)
+PAGES = ("parts", "bodies", "play.gym", "machine", "pictures", "worlds")
 """Public modules of the package, besides itself."""
 
 _PLACES = {

@@ -96,10 +96,7 @@ REFUSED: dict[str, tuple[Change, str]] = {
     "child": (key("nodes", 4, "children", value=[99]), r"nodes\[4\]\.children is 99, but the .* 6"),
     "nodes": (key("nodes", value=[{}] * 20_000), r"has 20000 nodes; the maximum is 10000"),
     "count": (key("accessors", 0, "count", value=85), r"accessors\[0\] ends at byte 1020 of buff"),
-    "huge": (
-        key("accessors", 0, "count", value=10**12),
-        r"needs 3,000,000,000,000 numbers; the",
-    ),
+    "huge": (key("accessors", 0, "count", value=10**12), r"needs 3,000,000,000,000 numbers; the"),
     "offset": (key("accessors", 0, "byteOffset", value=4), r"accessors\[0\] ends at byte 1012"),
     "negative": (key("accessors", 0, "byteOffset", value=-4), r"accessors\[0\]\.byteOffset: .*-4"),
     "stride": (key("bufferViews", 0, "byteStride", value=4), r"have 12 bytes, but byteStride is 4"),
@@ -163,10 +160,7 @@ REFUSED: dict[str, tuple[Change, str]] = {
         key("animations", 0, "samplers", 1, "interpolation", value="CUBICSPLINE"),
         r"samplers\[1\]\.output has 13 values for 13 keys, not 39",
     ),
-    "rotation": (
-        key("nodes", 2, "rotation", value=[0] * 4),
-        r"nodes\[2\]\.rotation is not a unit",
-    ),
+    "rotation": (key("nodes", 2, "rotation", value=[0] * 4), r"nodes\[2\]\.rotation is not a unit"),
     "missing file": (buffer_elsewhere("box.bin"), r"buffers\[0\], 'box\.bin', cannot be read \(No"),
     "data": (buffer_elsewhere("data:,x"), r"buffers\[0\] has 1 bytes, and its byteLength"),
 }

@@ -191,10 +191,7 @@ def test_limits_hold_and_are_told(tmp_path: Path) -> None:
     ("commands", "said"),
     [
         ({"elbow": Torque(1.0)}, "no joint 'elbow' in the model. It has: hinge, wrist"),
-        (
-            {"hinge": 1.0},
-            "the command to 'hinge' is 1.0: give a Position, a Vel",
-        ),
+        ({"hinge": 1.0}, "the command to 'hinge' is 1.0: give a Position, a Vel"),
         ({"hinge": Torque(np.nan)}, "the command to 'hinge' has nan: give a finite number"),
         ({"hinge": Velocity([1.0, 2.0])}, r"the command to 'hinge' has \[1.0, 2.0\]: give a"),
     ],

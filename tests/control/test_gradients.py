@@ -38,9 +38,7 @@ def wave(x: np.ndarray) -> float:
 
 
 HERE = np.array([0.4, -0.3, 0.7])
-SLOPE = np.array(
-    [np.cos(0.4) * np.exp(-0.15), 0.5 * np.sin(0.4) * np.exp(-0.15), 3.0 * 0.7**2],
-)
+SLOPE = np.array([np.cos(0.4) * np.exp(-0.15), 0.5 * np.sin(0.4) * np.exp(-0.15), 3.0 * 0.7**2])
 
 
 @pytest.mark.parametrize(

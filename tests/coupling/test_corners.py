@@ -6,13 +6,7 @@ import numpy as np
 import pytest
 
 from flowborne import Array, Fluid, Grid, Setup, SolidModel, World
-from flowborne.worlds import (
-    Boundaries,
-    BoundaryClosed,
-    BoundaryInflow,
-    BoundaryOpen,
-    set_velocity,
-)
+from flowborne.worlds import Boundaries, BoundaryClosed, BoundaryInflow, BoundaryOpen, set_velocity
 from flowborne_validation.worlds import NOWHERE, PERIODIC, mjcf, recorded
 
 RE, CELLS = 20.0, 6

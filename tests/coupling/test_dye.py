@@ -75,9 +75,7 @@ def piston(model: Model, solid: bool = False) -> World:
 
 
 @pytest.mark.parametrize(
-    ("steps", "dt"),
-    [(1000, 1 / 128), (100, 1 / 32)],
-    ids=["0.6 cells a step", "2.4 cells a step"],
+    ("steps", "dt"), [(1000, 1 / 128), (100, 1 / 32)], ids=["0.6 cells a step", "2.4 cells a step"]
 )
 @MODELS
 def test_dye_never_crosses_a_thin_plate_from_wall_to_wall(

@@ -10,11 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from flowborne.coupling.fractions import Geometry
-from flowborne.coupling.operators import (
-    add_flux,
-    leak_proof,
-    pressure_push,
-)
+from flowborne.coupling.operators import add_flux, leak_proof, pressure_push
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.control_volumes import control_volumes, face_masses
 from flowborne.fluid.grid import Array, Faces, Grid
@@ -77,10 +73,7 @@ def test_flux_and_wrench_are_transposes(cut: Cut, name: str) -> None:
 
 
 @pytest.mark.parametrize("name", GRIDS)
-@given(
-    place=st.tuples(*[st.floats(-0.3, 0.3)] * 3),
-    turn=st.tuples(*[st.floats(-1.0, 1.0)] * 3),
-)
+@given(place=st.tuples(*[st.floats(-0.3, 0.3)] * 3), turn=st.tuples(*[st.floats(-1.0, 1.0)] * 3))
 @settings(max_examples=25, deadline=None)
 def test_uniform_pressure_pushes_a_whole_body_nowhere(
     cut: Cut, name: str, place: tuple[float, ...], turn: tuple[float, ...]

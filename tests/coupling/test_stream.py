@@ -43,9 +43,7 @@ def flag(grid: Grid, *, one_way: bool) -> World:
 )
 def test_the_stream_pushes_as_a_wind_and_does_not_feel_the_body(grid: Grid) -> None:
     world = flag(grid, one_way=True)
-    alone = World.at_rest(
-        Setup(world.setup.solid, winds=(WindFaces((1.5, 0.5, 0.0), 1.2),)),
-    )
+    alone = World.at_rest(Setup(world.setup.solid, winds=(WindFaces((1.5, 0.5, 0.0), 1.2),)))
     for _ in range(10):
         report, plain = step(world, 0.02), step(alone, 0.02)
         assert np.abs(report.pressure_wrench).max() == 0.0

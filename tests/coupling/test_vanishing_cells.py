@@ -19,10 +19,7 @@ PISTON = (
 
 @pytest.mark.parametrize(
     "grid",
-    [
-        fb.Grid.slab(64, 32, H, (-1.0, -0.5)),
-        fb.Grid((48, 24, 24), H, (-0.75, -0.375, -0.375)),
-    ],
+    [fb.Grid.slab(64, 32, H, (-1.0, -0.5)), fb.Grid((48, 24, 24), H, (-0.75, -0.375, -0.375))],
     ids=["slab", "room"],
 )
 def test_what_a_piston_pushes_out_of_closing_cells_is_no_faster_than_what_passes_it(

@@ -19,13 +19,7 @@ from flowborne.fluid.sides.kinds import (
     BoundaryOpen,
     BoundaryPeriodic,
 )
-from flowborne.fluid.transport import (
-    COURANT,
-    NO_INLETS,
-    Inlets,
-    Transport,
-    carry_component,
-)
+from flowborne.fluid.transport import COURANT, NO_INLETS, Inlets, Transport, carry_component
 
 from ..kernels.references.faces import face_means
 

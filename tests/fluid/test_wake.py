@@ -13,14 +13,7 @@ from flowborne.fluid.sea_slab import across, leaving, node_circulation, nodes_of
 from flowborne.fluid.sides.far import BoundaryFar
 from flowborne.fluid.sides.kinds import BoundaryClosed
 from flowborne.fluid.sides.side import Place
-from flowborne.fluid.wake import (
-    BIN,
-    BINS,
-    moved,
-    resampled,
-    wake_line,
-    with_all_circulation_0,
-)
+from flowborne.fluid.wake import BIN, BINS, moved, resampled, wake_line, with_all_circulation_0
 
 GRID = Grid.slab(12, 8, 0.5, (-1.0, 2.0))
 

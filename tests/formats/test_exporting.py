@@ -73,10 +73,7 @@ def test_the_command_says_what_it_wrote(
 @pytest.mark.parametrize(
     ("name", "said"),
     [
-        (
-            "out.fbx",
-            "out.fbx: nothing writes '.fbx' files. End its name with one of .abc, .bvh",
-        ),
+        ("out.fbx", "out.fbx: nothing writes '.fbx' files. End its name with one of .abc, .bvh"),
         ("out.glb", "has no bodies. Add [solids] or [human] to its scene."),
         ("file/out.csv", "cannot be written (File exists)"),
     ],

@@ -6,22 +6,10 @@ import numpy as np
 import pytest
 
 from flowborne.fluid.transport import neighbours
-from flowborne.kernels.flux import (
-    CLEAR,
-    CUT,
-    GHOSTS,
-    UPSTREAM,
-    largest_crossing,
-    pad_field,
-    stage,
-)
+from flowborne.kernels.flux import CLEAR, CUT, GHOSTS, UPSTREAM, largest_crossing, pad_field, stage
 
 from .cut_cells import face_shape
-from .references.flux import (
-    largest_crossing_reference,
-    side_fluxes_reference,
-    stage_reference,
-)
+from .references.flux import largest_crossing_reference, side_fluxes_reference, stage_reference
 
 Shape = tuple[int, ...]
 

@@ -93,12 +93,7 @@ FAMILIES = {
         {"lower_back": "Chest", "lower_neck": "Neck", "head": "Head"},
     ),
     "biovision": (
-        (
-            "Hips Chest",
-            "Neck Head",
-            "*UpLeg *LowLeg *Foot",
-            "*Collar *UpArm *LowArm *Hand",
-        ),
+        ("Hips Chest", "Neck Head", "*UpLeg *LowLeg *Foot", "*Collar *UpArm *LowArm *Hand"),
         18,
         {"left_knee": "LeftLowLeg", "right_elbow": "RightLowArm", "left_clavicle": "LeftCollar"},
     ),

@@ -52,11 +52,7 @@ def test_stable_baselines_finds_nothing_wrong(name: str) -> None:
 
 def test_environments_are_made_by_name() -> None:
     env = gymnasium.make("flowborne/block-v0", scene=coarse("ns-block-drag-max"))
-    assert env.unwrapped.observed[:3] == (
-        "position_hinge_rad",
-        "velocity_hinge",
-        "drive_hinge",
-    )
+    assert env.unwrapped.observed[:3] == ("position_hinge_rad", "velocity_hinge", "drive_hinge")
     env.close()
 
 

@@ -177,12 +177,7 @@ def test_what_is_saved_stands_on_its_own(write: Write, tmp_path: Path) -> None:
 LEGS = "\n".join(f'{s}_{j} = "{s}_{j}"' for s in ("left", "right") for j in ("hip", "knee"))
 
 FAULTS: dict[str, tuple[str, dict[str, str], dict[str, str], str]] = {
-    "a file that is not there": (
-        "",
-        {"walk.bvh": "wlak.bvh"},
-        {},
-        "wlak.bvh",
-    ),
+    "a file that is not there": ("", {"walk.bvh": "wlak.bvh"}, {}, "wlak.bvh"),
     "a unit that is off by 100": (
         "",
         {"unit = 0.01": "unit = 1.0"},
@@ -273,8 +268,7 @@ def test_any_creature_follows_joints_of_its_own_names(write: Write) -> None:
 
 def test_any_creature_follows_by_a_mapping_of_its_own(write: Write) -> None:
     path = write(
-        '[solids]\nmodel = "arm.xml"\n[clip.mapping]\nswing = "left_shoulder"\n',
-        {"[human]\n": ""},
+        '[solids]\nmodel = "arm.xml"\n[clip.mapping]\nswing = "left_shoulder"\n', {"[human]\n": ""}
     )
     path.with_name("arm.xml").write_text(ARM)
     world = built(path).world

@@ -107,9 +107,7 @@ ONE_FAULT = {
         "the flow. Make every side far, or closed opposite a far one.",
     ),
     "a sea that turns back": (
-        {
-            'x_max = "open"': f"x_max = {TURNING}\ny_min = {TURNING}",
-        },
+        {'x_max = "open"': f"x_max = {TURNING}\ny_min = {TURNING}"},
         "scene swim.toml, [boundaries] x_max: factors [1.0, -1.0] turn the sea's stream around, "
         "and it leaves through one side only. Keep them at 0 or above.",
     ),
@@ -132,10 +130,7 @@ ONE_FAULT = {
         "scene swim.toml, gravity: [0.0, 0.0, -9.81] leaves the plane of a scene of 2 dimensions. "
         "Make its z component 0.",
     ),
-    "a model that is missing": (
-        {"squid.xml": "octopus.xml"},
-        "octopus.xml. Correct solids.model.",
-    ),
+    "a model that is missing": ({"squid.xml": "octopus.xml"}, "octopus.xml. Correct solids.model."),
     "motion and control on one joint": (
         {'joints = ["wrist"]': 'joints = ["wrist", "shoulder"]'},
         "scene swim.toml, [[control]] 1: joint 'shoulder' has a [[motion]] as well. "

@@ -225,19 +225,11 @@ def wrong_files(folder: Path) -> Iterator[tuple[str, dict[str, Any]]]:
         ('"still.npz"', "wrist", "{}/still.npz has no frame yet, or frames that do not follow"),
         ('"one.npz"', "wrist", "{}/one.npz has no frame yet"),
         ('"wide.npz"', "wrist", "joint 'shoulder' has 2 numbers in the earlier run and 1"),
-        (
-            '"first"',
-            "shoulder",
-            "what was controlled there is so here, or has a [[motion]]",
-        ),
+        ('"first"', "shoulder", "what was controlled there is so here, or has a [[motion]]"),
         ('"first"\njoints = ["shoulder"]', "shoulder", "joint 'shoulder' is controlled as well."),
         ('"first"\njoints = ["rail"]', "wrist", "'rail' was not controlled in the earlier run"),
         ('"first"\njoints = ["elbow"]', "wrist", "joint 'elbow' is not in model arm.xml"),
-        (
-            '"first"\n[initial]\npositions = { shoulder = 3.0 }',
-            "wrist",
-            "motion of the [earlier]",
-        ),
+        ('"first"\n[initial]\npositions = { shoulder = 3.0 }', "wrist", "motion of the [earlier]"),
     ],
 )
 def test_an_earlier_run_that_cannot_be_used_is_refused_in_one_message(

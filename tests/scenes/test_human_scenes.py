@@ -44,9 +44,7 @@ class Walked:
 
 @cache
 def walked(
-    scene: str,
-    settings: tuple[tuple[str, str], ...] = (),
-    frames: tuple[int, int] = TWO_STRIDES,
+    scene: str, settings: tuple[tuple[str, str], ...] = (), frames: tuple[int, int] = TWO_STRIDES
 ) -> Walked:
     rows, lowest = [], []
     with Simulation(load_scene(f"human-{scene}", dict(settings))) as simulation:

@@ -180,12 +180,7 @@ def test_meshes_and_includes_travel_with_the_scene(write: Write, tmp_path: Path)
     path.write_text('[solids]\nmodel = "fish.xml"')
     scene = load_scene(path)
     files = scene_files(scene)
-    assert sorted(files) == [
-        "assets/tail.xml",
-        "assets/tetra.obj",
-        "fish.xml",
-        "scene.toml",
-    ]
+    assert sorted(files) == ["assets/tail.xml", "assets/tetra.obj", "fish.xml", "scene.toml"]
     run = tmp_path / "run"
     copy = load_scene(save_scene(scene, run))
     assert_same(copy, scene)

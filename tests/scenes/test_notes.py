@@ -27,10 +27,7 @@ def test_probes_wider_than_fixed_steps_are_told(settings: dict[str, str], told: 
 
 
 def test_sides_that_whole_cells_make_longer_are_told() -> None:
-    for resolution, told in (
-        ("36", ""),
-        ("48", "y to 0.164 m for 0.16, z to 0.136 m for 0.128"),
-    ):
+    for resolution, told in (("36", ""), ("48", "y to 0.164 m for 0.16, z to 0.136 m for 0.128")):
         scene = load_scene("fish", {"domain.resolution": resolution})
         notes = " ".join(notes_of(scene, build(scene).world.setup.solid))
         assert ("longer" in notes) == bool(told)

@@ -207,10 +207,7 @@ def test_water_as_light_as_air(warned: Warned) -> None:
             },
             "the flow of [[sources]] 1 crosses up to 4 cells",
         ),
-        (
-            {"[fluid]": "[fluid]\nvelocity = [10.0, 10.0]"},
-            "the initial flow crosses up to 4 cells",
-        ),
+        ({"[fluid]": "[fluid]\nvelocity = [10.0, 10.0]"}, "the initial flow crosses up to 4 cells"),
     ],
 )
 def test_too_many_cells_in_a_step_and_the_steps_that_make_it_one(

@@ -183,11 +183,7 @@ def test_a_ring_from_a_scene_file_sinks_and_its_run_stands_on_its_own(
 @pytest.mark.parametrize(
     ("before", "after", "said"),
     [
-        (
-            'kind = "torus"',
-            'kind = "tours"',
-            "'tours' is not known. Plugins have registered",
-        ),
+        ('kind = "torus"', 'kind = "tours"', "'tours' is not known. Plugins have registered"),
         ("tube = 0.1", "", "of kind 'torus': key 'tube' is missing. Add it"),
         ('body = "ring"', 'body = "rung"', "there is no body 'rung' for a shape. There are: world"),
         ("axis = [1.0, 0.0, 0.0]", "axis = [0.0, 0.0, 0.0]", "has an axis of no length"),

@@ -5,16 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flowborne import (
-    FrameReport,
-    Grid,
-    SceneError,
-    Simulation,
-    StepReport,
-    World,
-    load_scene,
-    step,
-)
+from flowborne import FrameReport, Grid, SceneError, Simulation, StepReport, World, load_scene, step
 from flowborne.bodies import TrajectorySinusoid, WindForce
 from flowborne.sim.columns import Columns
 from flowborne.worlds import make_world

@@ -63,8 +63,7 @@ def test_of_a_urdf_the_meshes_that_collide_are_copied_and_no_visuals_or_plugins(
 ) -> None:
     robot = URDF.format(mesh="package://arm_description/meshes/link.stl", ixx=1, mass=1)
     path = written(
-        tmp_path / "ros" / "arm_description",
-        {"urdf/arm.urdf": robot, "meshes/link.stl": STL},
+        tmp_path / "ros" / "arm_description", {"urdf/arm.urdf": robot, "meshes/link.stl": STL}
     )
     files = gathered(path)
     assert files.texts.keys() == {"arm.urdf"}
@@ -178,11 +177,7 @@ def test_packages_are_looked_for_where_the_scene_says(tmp_path: Path) -> None:
             "<mujoco><worldbody><body><composite type='cable'/></body></worldbody></mujoco>",
             "it has a <composite>, which MuJoCo 4 does not have",
         ),
-        (
-            "a.urdf",
-            URDF.format(mesh="link.DAE", ixx=1, mass=1),
-            "its mesh link.DAE is COLLADA",
-        ),
+        ("a.urdf", URDF.format(mesh="link.DAE", ixx=1, mass=1), "its mesh link.DAE is COLLADA"),
         ("a.xml", "<mujoco><include file='a.xml'/></mujoco>", "includes a.xml once more"),
     ],
 )

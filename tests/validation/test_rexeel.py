@@ -22,16 +22,10 @@ from flowborne_validation.rexeel import (
 swim = cache(rexeel.swim)
 """Each swim once for all tests."""
 
-STILL = {
-    20: [2.367, 17.360, 3.699, 16.741, 17.093],
-    40: [5.064, 30.963, 6.584, 28.579, 31.261],
-}
+STILL = {20: [2.367, 17.360, 3.699, 16.741, 17.093], 40: [5.064, 30.963, 6.584, 28.579, 31.261]}
 """Errors of a robot that does not move at all. Genesis' head never turns: the last is published."""
 
-MEAN = {
-    20: [0.909, 0.957, 1.023, 0.964, 1.328],
-    40: [1.396, 0.767, 1.446, 0.765, 2.147],
-}
+MEAN = {20: [0.909, 0.957, 1.023, 0.964, 1.328], 40: [1.396, 0.767, 1.446, 0.765, 2.147]}
 """Errors of the mean of all runs."""
 
 

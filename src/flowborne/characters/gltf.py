@@ -213,11 +213,7 @@ class GltfSource:
 
 def _local(node: Node, number: int, times: Array, curves: dict[tuple[int, str], Curve]) -> Array:
     """(frames, 4, 4) frame of a node to its parent's."""
-    rest = {
-        "translation": node.translation,
-        "rotation": node.rotation,
-        "scale": node.scale,
-    }
+    rest = {"translation": node.translation, "rotation": node.rotation, "scale": node.scale}
     now = {
         path: _sampled(*curves[number, path], times, turns=path == "rotation")
         if (number, path) in curves

@@ -18,13 +18,7 @@ from PIL import Image
 
 from flowborne.base.colours import to_linear, to_srgb
 from flowborne.base.errors import SceneError
-from flowborne.characters.gltf_document import (
-    Accessor,
-    Document,
-    Primitive,
-    TextureInfo,
-    embedded,
-)
+from flowborne.characters.gltf_document import Accessor, Document, Primitive, TextureInfo, embedded
 from flowborne.characters.rig import PLAIN, Array, Integers
 
 KINDS = {

@@ -26,13 +26,7 @@ from typer.core import TyperGroup
 from flowborne.base.errors import PartError, SceneError, fault_of
 from flowborne.base.extras import check_drawing, missing_to_draw, optional
 from flowborne.base.version import __version__
-from flowborne.cli.console import (
-    batch_lines,
-    check_lines,
-    complain,
-    run_lines,
-    sentence_of,
-)
+from flowborne.cli.console import batch_lines, check_lines, complain, run_lines, sentence_of
 from flowborne.runs.run_folder import RunFolder, RunFolderError, cannot_write
 
 log = logging.getLogger("flowborne")

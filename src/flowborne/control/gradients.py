@@ -85,10 +85,7 @@ class Gradient(Protocol):
 
 
 GRADIENTS: Registry[Gradient] = Registry(
-    "gradient",
-    methods=("of", "estimate"),
-    taken=("central", "one-sided"),
-    given=("displacement",),
+    "gradient", methods=("of", "estimate"), taken=("central", "one-sided"), given=("displacement",)
 )
 """Gradients that users have registered; `displacement` comes from the probes, rad or m per dof."""
 

@@ -63,11 +63,7 @@ def mark_own(marks: Marks, w: Triple, inverse: Real, factor: Integers) -> None:
 
 @kernel
 def mark_largest(
-    marks: Marks,
-    w: Triple,
-    inverse: Real,
-    first: tuple[int, int, int],
-    end: tuple[int, int, int],
+    marks: Marks, w: Triple, inverse: Real, first: tuple[int, int, int], end: tuple[int, int, int]
 ) -> None:
     """Mark the largest connected part of at most 2 x 2 x 2 cells as OWN, the others as 0."""
     w0, w1, w2 = w
@@ -267,13 +263,7 @@ def add_orphan_weights(
 
 @kernel
 def add_between(
-    coarse: Triple,
-    shape: Integers,
-    a: int,
-    b: int,
-    weight: float,
-    ratio: Array,
-    periodic: Periodic,
+    coarse: Triple, shape: Integers, a: int, b: int, weight: float, ratio: Array, periodic: Periodic
 ) -> None:
     """Add a fine weight to the coarse face between two coarse cells, if they share one."""
     low, high = min(a, b), max(a, b)

@@ -194,12 +194,7 @@ def merge_small(amount: Array, small: Integers, targets: Integers, shares: Array
 
 @njit(nogil=True, cache=True)
 def join_small(
-    field: Array,
-    volumes: Array,
-    small: Integers,
-    targets: Integers,
-    shares: Array,
-    nothing: float,
+    field: Array, volumes: Array, small: Integers, targets: Integers, shares: Array, nothing: float
 ) -> None:
     """Give these shares (n, 2) of what small ones hold, and of their volumes, to their targets, in
     place.
@@ -225,12 +220,7 @@ def join_small(
 
 @njit(nogil=True, cache=True)
 def fill_empty(
-    field: Array,
-    volumes: Array,
-    listed: Integers,
-    nothing: float,
-    shape: Integers,
-    wraps: Integers,
+    field: Array, volumes: Array, listed: Integers, nothing: float, shape: Integers, wraps: Integers
 ) -> None:
     """Give listed control volumes that hold nothing the mean of those beside them, in place."""
     flat, volume = field.reshape(-1), volumes.reshape(-1)

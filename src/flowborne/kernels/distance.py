@@ -30,13 +30,7 @@ def distance_to_ellipsoid(x: float, y: float, z: float, a: float, b: float, c: f
 
 @njit(nogil=True, cache=True, inline="never")
 def distance_in_table(
-    x: float,
-    y: float,
-    z: float,
-    tables: Array,
-    table: Integers,
-    corner: Array,
-    pitch: float,
+    x: float, y: float, z: float, tables: Array, table: Integers, corner: Array, pitch: float
 ) -> float:
     """Trilinear sample of a table of distances; beyond the table the way to it is added."""
     n1, n2, n3 = table[1], table[2], table[3]

@@ -29,12 +29,7 @@ def net_out(out: Array, qx: Array, qy: Array, qz: Array) -> None:
 
 @kernel
 def subtract_gradient(
-    velocity: Array,
-    rate: Array,
-    pressure: Array,
-    axis: int,
-    scale: float,
-    codes: Integers,
+    velocity: Array, rate: Array, pressure: Array, axis: int, scale: float, codes: Integers
 ) -> None:
     """Subtract scale rate (p_upper - p_lower) from the velocity of the faces across `axis`.
 

@@ -52,11 +52,7 @@ def is_crossed(w: Array, i: int, j: int) -> bool:
 
 @kernel
 def label_regions(
-    finest: Finest,
-    periodic: Periodic,
-    label: Labels,
-    parent: Labels,
-    count: Labels,
+    finest: Finest, periodic: Periodic, label: Labels, parent: Labels, count: Labels
 ) -> int:
     """Number the regions that have no open side.
 

@@ -84,12 +84,7 @@ def add_crossings(
 
 @njit(nogil=True, cache=True)
 def lower_squares(
-    square: Array,
-    counts: tuple[int, int, int],
-    a: Point,
-    b: Point,
-    c: Point,
-    band: float,
+    square: Array, counts: tuple[int, int, int], a: Point, b: Point, c: Point, band: float
 ) -> None:
     """Lower the squared distance to the skin, in cells, to that of one triangle, at the nodes that
     are up to `band` cells beside it."""

@@ -9,10 +9,7 @@ from numba import njit
 
 from flowborne.kernels.arrays import Array, Integers, Mask, Point
 from flowborne.kernels.skin import ON_SKIN
-from flowborne.kernels.triangles import (
-    closest_on_triangle,
-    squared_distance,
-)
+from flowborne.kernels.triangles import closest_on_triangle, squared_distance
 
 MOST_CELLS = 128.0
 """Cells along the longest side of a body in which its triangles are looked up, at most."""

@@ -30,14 +30,7 @@ from flowborne.kernels.levels import (
     weights_at,
     wrap_ghosts,
 )
-from flowborne.kernels.smoothing import (
-    STEPS,
-    defect,
-    first_smooth,
-    smooth,
-    smooth_down,
-    smooth_up,
-)
+from flowborne.kernels.smoothing import STEPS, defect, first_smooth, smooth, smooth_down, smooth_up
 
 
 @kernel

@@ -64,13 +64,7 @@ def dot(a: Real, b: Array, scale: float = 1.0) -> float:
 
 @kernel
 def descend(
-    x: Array,
-    r: Array,
-    p: Array,
-    q: Array,
-    alpha: float,
-    b: Real | None = None,
-    scale: float = 1.0,
+    x: Array, r: Array, p: Array, q: Array, alpha: float, b: Real | None = None, scale: float = 1.0
 ) -> float:
     """x += alpha p, r -= alpha q, and b = scale x r in b's precision; returns r . r."""
     planes, size = r.shape[0], r.shape[2]

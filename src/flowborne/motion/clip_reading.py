@@ -35,14 +35,7 @@ STANDARD_LEG_LENGTH = 0.856
 MIN_STANDING_COSINE = 0.5
 """Least cosine of the angle between a standing person and the vertical."""
 
-UNITS = {
-    0.001: "mm",
-    0.01: "cm",
-    0.0254: "inches",
-    0.056444: "CMU's own",
-    0.3048: "feet",
-    1.0: "m",
-}
+UNITS = {0.001: "mm", 0.01: "cm", 0.0254: "inches", 0.056444: "CMU's own", 0.3048: "feet", 1.0: "m"}
 
 MAX_PERSON_STRETCH = 0.02
 """Largest deviation of a person's joint from the end of its rigid bone, m."""

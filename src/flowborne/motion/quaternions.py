@@ -30,11 +30,7 @@ def rotated(quaternion: Array, vector: Array) -> Array:
     w, x, y, z = np.moveaxis(quaternion, -1, 0)
     a, b, c = np.moveaxis(vector, -1, 0)
     p, q, r = 2.0 * (y * c - z * b), 2.0 * (z * a - x * c), 2.0 * (x * b - y * a)
-    entries = (
-        a + w * p + y * r - z * q,
-        b + w * q + z * p - x * r,
-        c + w * r + x * q - y * p,
-    )
+    entries = (a + w * p + y * r - z * q, b + w * q + z * p - x * r, c + w * r + x * q - y * p)
     return np.stack(entries, axis=-1)
 
 

@@ -22,14 +22,7 @@ import numpy as np
 
 from flowborne.base.errors import SceneError
 from flowborne.base.extras import optional
-from flowborne.control.commands import (
-    Command,
-    Position,
-    Torque,
-    Velocity,
-    servo_of,
-    torque_limit,
-)
+from flowborne.control.commands import Command, Position, Torque, Velocity, servo_of, torque_limit
 from flowborne.control.measurement import Measurement
 from flowborne.kernels.arrays import Array
 from flowborne.runs.frame_report import FrameReport

@@ -111,10 +111,7 @@ class Play:
         return self._last
 
     def record(
-        self,
-        until: Moment,
-        folder: Path,
-        progress: Callable[[RunProgress], None] | None = None,
+        self, until: Moment, folder: Path, progress: Callable[[RunProgress], None] | None = None
     ) -> str:
         """Write what was played until a moment to a run folder; a sentence about it.
 

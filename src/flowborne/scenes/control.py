@@ -9,14 +9,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from flowborne.base.tables import (
-    Count,
-    Positive,
-    Steps,
-    StepsOrNone,
-    Table,
-    Text,
-)
+from flowborne.base.tables import Count, Positive, Steps, StepsOrNone, Table, Text
 from flowborne.control.gradients import AnyGradient, GradientCentralTable
 from flowborne.control.phases import PhaseTable
 from flowborne.control.rules import AnyRule, RuleFixed

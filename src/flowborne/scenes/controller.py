@@ -44,9 +44,7 @@ def controller_of(scene: Scene, around: Surroundings, executor: Mapper) -> Contr
         limit += [math.inf if table.torque_limit is None else table.torque_limit] * len(units)
         in_phases += [
             StrengthInPhase(
-                own,
-                tuple(unit * other.strength for unit in units),
-                other.phases.build(around),
+                own, tuple(unit * other.strength for unit in units), other.phases.build(around)
             )
             for other in table.in_phases
         ]

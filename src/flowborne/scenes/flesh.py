@@ -35,10 +35,7 @@ from flowborne.solids.tissue.mesh_file import read_mesh, recipe_of
 from flowborne.solids.tissue.surface_file import surface_bytes
 from flowborne.solids.tissue.symmetry import SAME
 
-LAWS = {
-    "neo-hookean": Law.STABLE_NEO_HOOKEAN,
-    "st-venant-kirchhoff": Law.SAINT_VENANT_KIRCHHOFF,
-}
+LAWS = {"neo-hookean": Law.STABLE_NEO_HOOKEAN, "st-venant-kirchhoff": Law.SAINT_VENANT_KIRCHHOFF}
 
 
 class FleshTable(Table):

@@ -218,11 +218,5 @@ def _walked(scene: Scene, capture: Capture, model: SolidModel, q: Array) -> Clip
     )
     places = model.positions_of(clip.names[0])[:3]
     return Clip(
-        clip.names,
-        clip.parents,
-        clip.offsets,
-        clip.ends,
-        scene.frame_time,
-        rotations,
-        q[:, places],
+        clip.names, clip.parents, clip.offsets, clip.ends, scene.frame_time, rotations, q[:, places]
     )

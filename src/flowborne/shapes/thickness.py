@@ -39,10 +39,7 @@ def thinnest(vertices: Array, triangles: Integers, slab: bool, way: Array | None
 
 
 def thin_parts(
-    vertices: Array,
-    triangles: Integers,
-    width: float,
-    thickened: Mask | None = None,
+    vertices: Array, triangles: Integers, width: float, thickened: Mask | None = None
 ) -> float:
     """Length of the tips of a body along its surface, where no ball of diameter `width` m fits, m.
 

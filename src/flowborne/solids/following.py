@@ -65,10 +65,7 @@ def outboard_dofs(model: SolidModel, dofs: int | Integers) -> Integers:
 
 
 def rigidify(
-    model: SolidModel,
-    state: SolidState,
-    dofs: Integers,
-    fixed: Mask | None = None,
+    model: SolidModel, state: SolidState, dofs: Integers, fixed: Mask | None = None
 ) -> SolidState:
     """State in which the joints `dofs` do not move, by impulses at these joints only.
 

@@ -66,10 +66,7 @@ NOTHING = Given()
 
 
 def compiled(
-    source: str | Path,
-    slab: bool,
-    gravity: tuple[float, float, float],
-    given: Given = NOTHING,
+    source: str | Path, slab: bool, gravity: tuple[float, float, float], given: Given = NOTHING
 ) -> mujoco.MjModel:
     """MuJoCo's model of an MJCF file (a Path) or text (a str).
 
@@ -81,10 +78,7 @@ def compiled(
 
 
 def bones_of(
-    source: str | Path,
-    slab: bool,
-    gravity: tuple[float, float, float],
-    given: Given = NOTHING,
+    source: str | Path, slab: bool, gravity: tuple[float, float, float], given: Given = NOTHING
 ) -> tuple[mujoco.MjSpec, mujoco.MjModel]:
     """The spec and the model of an MJCF file or text, as `compiled`, without flesh."""
     where = _named(source)

@@ -9,11 +9,7 @@ import numpy as np
 
 from flowborne.base.phrases import listed
 
-REPLACED = {
-    "integrator": mujoco.mjtIntegrator,
-    "solver": mujoco.mjtSolver,
-    "cone": mujoco.mjtCone,
-}
+REPLACED = {"integrator": mujoco.mjtIntegrator, "solver": mujoco.mjtSolver, "cone": mujoco.mjtCone}
 """Options that the coupled solve has its own of, and MuJoCo's names for their values."""
 
 MEDIUM = ("density", "viscosity", "wind")

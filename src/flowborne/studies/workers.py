@@ -101,9 +101,7 @@ class Workers:
         if self._executor is None:
             self._others = set(multiprocessing.active_children())
             self._executor = ProcessPoolExecutor(
-                self.most,
-                mp_context=multiprocessing.get_context("spawn"),
-                initializer=begin_worker,
+                self.most, mp_context=multiprocessing.get_context("spawn"), initializer=begin_worker
             )
         return self._executor
 

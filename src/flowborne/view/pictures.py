@@ -20,13 +20,7 @@ from flowborne.view import style
 from flowborne.view.glyphs import SHAFT_WIDTH, arrow, round_number
 from flowborne.view.layout import MARGIN, Box, Layout
 from flowborne.view.maps import Map, MapSlab, MapSpace
-from flowborne.view.plots import (
-    LETTERS_IN_LEGEND,
-    Strip,
-    joint_curves,
-    shortened,
-    strip_curves,
-)
+from flowborne.view.plots import LETTERS_IN_LEGEND, Strip, joint_curves, shortened, strip_curves
 from flowborne.view.run import Run
 from flowborne.view.shot import Shot
 

@@ -5,9 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from flowborne.kernels.arrays import CLOSED, PERIODIC, Array, Integers
-from flowborne.kernels.closed_fractions import (
-    CREASE,
-)
+from flowborne.kernels.closed_fractions import CREASE
 
 
 def face_closed_reference(phi: Array, axis: int) -> Array:

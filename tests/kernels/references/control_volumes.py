@@ -85,12 +85,7 @@ def merge_small_reference(
 
 
 def join_small_reference(
-    field: Array,
-    volumes: Array,
-    small: Integers,
-    targets: Integers,
-    shares: Array,
-    nothing: float,
+    field: Array, volumes: Array, small: Integers, targets: Integers, shares: Array, nothing: float
 ) -> tuple[Array, Array]:
     """`join_small` in NumPy: field, but for that of whole small ones, and volumes after it."""
     amount = field * np.where(volumes > nothing, volumes, 1.0)
@@ -114,12 +109,7 @@ def fill_empty_reference(
 
 
 def level_reference(
-    field: Array,
-    volumes: Array,
-    listed: Integers,
-    leaving: Array,
-    nothing: float,
-    wraps: Integers,
+    field: Array, volumes: Array, listed: Integers, leaving: Array, nothing: float, wraps: Integers
 ) -> Array:
     """`level` in NumPy: the field after it."""
     levelled, volume = field.ravel().copy(), volumes.ravel()
@@ -178,12 +168,7 @@ def find_parts_reference(volume: Array, whole: float, component: int, wraps: Int
 
 
 def find_closed_reference(
-    opened: Array,
-    volume: Array,
-    component: int,
-    prescribed: Marks,
-    periodic: bool,
-    nothing: float,
+    opened: Array, volume: Array, component: int, prescribed: Marks, periodic: bool, nothing: float
 ) -> tuple[Integers, Array]:
     """`find_closed` in NumPy: closed faces, and on which ones pressure acts."""
     driven = (volume > nothing) & (opened > CLOSED_BELOW)

@@ -5,14 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from flowborne.fluid.grid import Array
-from flowborne.kernels.corner_friction import (
-    AROUND,
-    BEHIND,
-    BESIDE,
-    BEYOND,
-    NARROW,
-    NEXT,
-)
+from flowborne.kernels.corner_friction import AROUND, BEHIND, BESIDE, BEYOND, NARROW, NEXT
 
 Known = tuple[float, float, float]
 

@@ -6,13 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flowborne.kernels.arrays import Array, Faces, Integers, Rows
-from flowborne.kernels.coupling_rows import (
-    COVERED,
-    ENCLOSED,
-    NARROW,
-    WIDE,
-    Kinds,
-)
+from flowborne.kernels.coupling_rows import COVERED, ENCLOSED, NARROW, WIDE, Kinds
 
 
 def kinds_of_cells_reference(opened: Faces, walls: Integers) -> Kinds:

@@ -5,12 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from flowborne.kernels.arrays import Array, Faces, Integers, Marks
-from flowborne.kernels.flux import (
-    CLEAR,
-    GHOSTS,
-    ROOM,
-    UPSTREAM,
-)
+from flowborne.kernels.flux import CLEAR, GHOSTS, ROOM, UPSTREAM
 
 
 def line_flux_reference(

@@ -5,11 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from flowborne.kernels.arrays import Array, Integers
-from flowborne.kernels.node_distance import (
-    BAND,
-    FACET,
-    NEAR,
-)
+from flowborne.kernels.node_distance import BAND, FACET, NEAR
 
 from .distance import signed_distance_reference
 

@@ -9,12 +9,7 @@ from flowborne.kernels.arrays import CLOSED, OPEN, PERIODIC, Array
 
 
 def subtract_gradient_reference(
-    velocity: Array,
-    rate: Array,
-    pressure: Array,
-    axis: int,
-    scale: float,
-    codes: NDArray[np.int64],
+    velocity: Array, rate: Array, pressure: Array, axis: int, scale: float, codes: NDArray[np.int64]
 ) -> Array:
     """`subtract_gradient` in NumPy: the velocity after it.
 

@@ -6,14 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flowborne.kernels.arrays import CLOSED, PERIODIC, Array, Integers
-from flowborne.kernels.viscosity import (
-    GIVEN,
-    INACTIVE,
-    LEAST,
-    SAME,
-    TIED,
-    UNKNOWN,
-)
+from flowborne.kernels.viscosity import GIVEN, INACTIVE, LEAST, SAME, TIED, UNKNOWN
 
 from .cut_faces import closed_polygon_reference, open_edge_reference
 

@@ -263,10 +263,7 @@ def test_a_mesher_ends_with_the_process_that_began_it() -> None:
         f"subprocess.Popen([sys.executable, '-c', {waiting!r}]); sys.stdin.read()"
     )
     parent = subprocess.Popen(
-        [sys.executable, "-c", beginning],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
+        [sys.executable, "-c", beginning], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     )
     assert parent.stdout is not None
     assert parent.stdout.readline() == "waits\n"
@@ -318,10 +315,7 @@ def test_other_files_are_no_mesh_of_flesh(tmp_path: Path) -> None:
     ("changed", "said"),
     [
         ({"points": np.zeros((3, 2))}, "its points have no three coordinates each"),
-        (
-            {"elements_4": np.array([[0, 1, 2, 999]])},
-            "its elements have corners that are not",
-        ),
+        ({"elements_4": np.array([[0, 1, 2, 999]])}, "its elements have corners that are not"),
         ({"elements_4": np.zeros((2, 3), int)}, "its elements have no 4 corners each"),
         ({"elements_4": np.zeros((0, 4), int)}, "it has neither tetrahedra nor triangles"),
         ({"holder": np.zeros(3, int)}, "its points are held by bones that it does not name"),

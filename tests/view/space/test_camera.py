@@ -12,12 +12,7 @@ from flowborne.shapes.primitives import shape_of
 from flowborne.view.framing import swept
 from flowborne.view.run import Run
 from flowborne.view.shot import CameraShot, Shot
-from flowborne.view.space.camera import (
-    FILLED,
-    FILLED_BY_FLUID,
-    Camera,
-    camera_of,
-)
+from flowborne.view.space.camera import FILLED, FILLED_BY_FLUID, Camera, camera_of
 
 from .projecting import project
 

@@ -80,10 +80,7 @@ def test_of_several_parts_the_farthest_that_holds_the_place_counts() -> None:
         geom("sphere", (9.0, 0.0, 0.0), body=2),
     )
     places = np.array([[0.0, 0, 0], [0.1, 0, 0], [0.8, 0, 0], [0, 0, 0]])
-    state = {
-        "geom_position": places,
-        "geom_rotation": np.broadcast_to(np.eye(3), (4, 3, 3)),
-    }
+    state = {"geom_position": places, "geom_rotation": np.broadcast_to(np.eye(3), (4, 3, 3))}
     along = np.array([2.0, 0.0, 0.0])
     assert skin.reach(1, np.zeros(3), along, state, ()) == pytest.approx(0.4, rel=0.01)
     assert skin.reach(1, np.array([5.0, 0.0, 0.0]), along, state, ()) == 0.0

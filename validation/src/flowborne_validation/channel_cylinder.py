@@ -32,14 +32,7 @@ from flowborne_validation.shedding import (
     judged,
     watch,
 )
-from flowborne_validation.worlds import (
-    PLACES,
-    Parabola,
-    Place,
-    over_places,
-    recorded,
-    whole_steps,
-)
+from flowborne_validation.worlds import PLACES, Parabola, Place, over_places, recorded, whole_steps
 
 DIAMETER, CENTRE, LENGTH, HEIGHT = 0.1, 0.2, 2.2, 0.41
 """m: of the cylinder, both coordinates of its centre; of the channel."""

@@ -25,14 +25,12 @@ def validate(
         list[str] | None, typer.Option(metavar="ID", help="Only this case; may be repeated.")
     ] = None,
     tier: Annotated[
-        str,
-        typer.Option(metavar="TIER", help="minute, half-hour or all: how long it may take."),
+        str, typer.Option(metavar="TIER", help="minute, half-hour or all: how long it may take.")
     ] = "minute",
     report: Annotated[
         Path | None,
         typer.Option(
-            metavar="DIR",
-            help="Folder of a report; cases that it contains are not run again.",
+            metavar="DIR", help="Folder of a report; cases that it contains are not run again."
         ),
     ] = None,
     as_json: JsonOption = False,

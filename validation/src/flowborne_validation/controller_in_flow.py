@@ -242,7 +242,4 @@ def own_rule(scene: str, best: float, strengths: tuple[float, ...]) -> list[Find
     ]
 
 
-CASES = (
-    Case("K5", block_in_stream, Tier.HALF_HOUR, coarse=True),
-    Case("K6", frames_and_strength),
-)
+CASES = (Case("K5", block_in_stream, Tier.HALF_HOUR, coarse=True), Case("K6", frames_and_strength))

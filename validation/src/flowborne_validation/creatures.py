@@ -115,10 +115,7 @@ def flyer_gain(name: str, controlled: Flight, without: Flight) -> list[Finding]:
     down, up = np.abs(ours).mean(axis=0)
     title = f"{name}: upward impulse of a stroke with control less that without, N s"
     halves = f"{name}: drag impulse of the downstroke over that of the upstroke, with control"
-    return [
-        above(title, gain, 0.0, "sign", lines),
-        above(halves, float(down / up), 1.0, "more"),
-    ]
+    return [above(title, gain, 0.0, "sign", lines), above(halves, float(down / up), 1.0, "more")]
 
 
 @dataclass(frozen=True)

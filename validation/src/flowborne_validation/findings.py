@@ -259,11 +259,7 @@ def _figure(value: Measured, exact: float, on: Grids | None) -> tuple[float, Gri
 
 
 def order_of(
-    quantity: str,
-    series: GridSeries,
-    *,
-    least: float | None = None,
-    expected: float | None = None,
+    quantity: str, series: GridSeries, *, least: float | None = None, expected: float | None = None
 ) -> Finding:
     """A finding about an order of convergence: at least `least`, or `expected` to 0.2."""
     order = series.order

@@ -165,7 +165,7 @@ VARIANTS: Mapping[str, Mapping[str, str]] = {
 
 IMMERSED: Mapping[str, Mapping[str, str]] = {
     "with the tendons' arms in the water": {
-        "solids.displace": '{ classes = ["hull", "drive", "arm"] }',
+        "solids.displace": '{ classes = ["hull", "drive", "arm"] }'
     },
     "with all of it in the water": {
         "solids.displace": '{ classes = ["hull", "drive", "arm", "top"] }',

@@ -95,10 +95,7 @@ def vortices(cells: int) -> World:
     """F3's periodic box at the start."""
     grid = Grid((cells, cells, cells), SIDE / cells, (0.0, 0.0, 0.0))
     world = make_world(
-        grid=grid,
-        viscosity=1.0 / REYNOLDS,
-        boundaries=Boundaries(*(PERIODIC,) * 6),
-        tolerance=1e-7,
+        grid=grid, viscosity=1.0 / REYNOLDS, boundaries=Boundaries(*(PERIODIC,) * 6), tolerance=1e-7
     )
     set_velocity(world, solid_vortices)
     return world

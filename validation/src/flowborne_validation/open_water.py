@@ -25,15 +25,7 @@ from flowborne_validation.findings import (
     near,
     within,
 )
-from flowborne_validation.shedding import (
-    CFL,
-    STREAM,
-    UNBOUNDED,
-    backflow,
-    cylinder,
-    judged,
-    shed,
-)
+from flowborne_validation.shedding import CFL, STREAM, UNBOUNDED, backflow, cylinder, judged, shed
 from flowborne_validation.worlds import (
     Place,
     Vector,

@@ -20,10 +20,7 @@ POSES, APART, ARCS = 48, 0.25, (46.0, 34.0)
 """Number of poses in an arc, degrees from each to the next, and middles of the arcs in degrees, at
 the first of which the scene starts."""
 
-SHAPES = {
-    "box": 'size="0.1 0.5 0.5"',
-    "capsule": 'type="capsule" size="0.1 0.4" euler="90 0 0"',
-}
+SHAPES = {"box": 'size="0.1 0.5 0.5"', "capsule": 'type="capsule" size="0.1 0.4" euler="90 0 0"'}
 """The block's geom in MJCF, and a capsule of the same length and width."""
 
 STREAMS, PART = {"ideal": 0.0, "Re 100": 10.0}, 0.05

@@ -217,7 +217,4 @@ def apart(
     return float(away.max()), lines
 
 
-CASES = (
-    Case("V1", settling_cylinder, coarse=True),
-    Case("V2", settling, coarse=True),
-)
+CASES = (Case("V1", settling_cylinder, coarse=True), Case("V2", settling, coarse=True))

@@ -55,12 +55,7 @@ class Chamber:
         return np.asarray(left.points, dtype=np.float64), left.regular_faces.astype(np.int64)
 
     def unfold(
-        self,
-        points: Array,
-        elements: Integers,
-        wanted: Mask,
-        surface: Mesh,
-        tolerance: float,
+        self, points: Array, elements: Integers, wanted: Mask, surface: Mesh, tolerance: float
     ) -> tuple[Array, Integers]:
         """Points and right-handed tetrahedra of all images, joined at the walls.
 

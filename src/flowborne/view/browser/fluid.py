@@ -16,16 +16,7 @@ from flowborne.runs.states import cell_velocity
 from flowborne.view import style
 from flowborne.view.browser.meshes import Mesh, joined, nothing, show_mesh
 from flowborne.view.browser.settings import Settings
-from flowborne.view.fields import (
-    NUMBERS,
-    Field,
-    FieldNumber,
-    Legend,
-    Scale,
-    faded,
-    field_of,
-    over,
-)
+from flowborne.view.fields import NUMBERS, Field, FieldNumber, Legend, Scale, faded, field_of, over
 from flowborne.view.glyphs import arrow
 from flowborne.view.run import Run, State
 from flowborne.view.shot import Shot

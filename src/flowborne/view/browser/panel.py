@@ -258,10 +258,7 @@ class Panel:
         timeline = self._timeline
         state = ", playing" if timeline.playing else ", newest" if timeline.newest else ""
         self._clock.content = CLOCK.format(
-            time=timeline.times[number],
-            frame=run.frames[number],
-            last=run.frames[-1],
-            state=state,
+            time=timeline.times[number], frame=run.frames[number], last=run.frames[-1], state=state
         )
         self._slider_time = self._slider.value = round(float(timeline.time), 4)
 

@@ -46,8 +46,7 @@ class Surroundings:
         self._scene, self._run, self._view = scene, run, view
         scene.set_up_direction(view.up)
         scene.set_background_image(
-            np.broadcast_to(style.to_bytes(style.rgb(run.shot.colour)), (4, 4, 3)),
-            format="png",
+            np.broadcast_to(style.to_bytes(style.rgb(run.shot.colour)), (4, 4, 3)), format="png"
         )
         self.root = scene.add_frame("/run", show_axes=False)
         ground = not run.is_slab and stands_on_ground(run)
