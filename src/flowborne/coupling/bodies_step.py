@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from flowborne.coupling.motion import JointCommand
 from flowborne.coupling.operators import generalised, twists
 from flowborne.coupling.report import StepReport, Timer
 from flowborne.coupling.servo import joint_command
@@ -24,6 +23,7 @@ from flowborne.solids.driven import Driven, drive
 from flowborne.solids.dynamics import kinematics
 from flowborne.solids.following import follow
 from flowborne.solids.state import SolidState
+from flowborne.solids.trajectories import JointCommand
 
 
 def move_bodies(world: World, command: JointCommand, dt: float) -> None:

@@ -7,15 +7,13 @@ control of joints and muscles", which the paper uses.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 
-from flowborne.coupling.motion import JointCommand, Trajectory, velocity_after
+from flowborne.coupling.world import World
 from flowborne.kernels.arrays import Array, Integers
-
-if TYPE_CHECKING:
-    from flowborne.coupling.world import World
+from flowborne.solids.trajectories import JointCommand, Trajectory, velocity_after
 
 
 class Servo(Protocol):

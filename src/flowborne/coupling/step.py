@@ -45,7 +45,6 @@ from flowborne.coupling.flow import (
     store_state,
 )
 from flowborne.coupling.half_pressure import explicit_half_pressure
-from flowborne.coupling.motion import JointCommand
 from flowborne.coupling.operators import generalised
 from flowborne.coupling.report import Outcome, StepReport, Timer
 from flowborne.coupling.servo import joint_command
@@ -61,6 +60,7 @@ from flowborne.coupling.window import follow
 from flowborne.coupling.world import World
 from flowborne.fluid.control_volumes import face_masses
 from flowborne.solids.dynamics import kinematics
+from flowborne.solids.trajectories import JointCommand
 
 
 def step(world: World, dt: float, command: JointCommand | None = None) -> StepReport:

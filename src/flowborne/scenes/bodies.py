@@ -10,7 +10,6 @@ import numpy as np
 
 from flowborne.base.errors import SceneError
 from flowborne.base.phrases import suggestion
-from flowborne.coupling.motion import Trajectory
 from flowborne.fluid.grid import Array
 from flowborne.scenes.capture import clip_motion, human_of, pose_controlled
 from flowborne.scenes.draft import Draft
@@ -36,6 +35,7 @@ from flowborne.solids.joint_kinds import (
 from flowborne.solids.mjcf import Given
 from flowborne.solids.model import SolidModel
 from flowborne.solids.state import SolidState
+from flowborne.solids.trajectories import Trajectory
 
 
 def load_model(scene: Scene) -> SolidModel:

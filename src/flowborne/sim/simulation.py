@@ -32,9 +32,9 @@ from flowborne.solids.surfaces import geom_boxes
 
 if TYPE_CHECKING:
     from flowborne.control.controller import Controller
-    from flowborne.coupling.motion import JointCommand
     from flowborne.scenes.schema import Scene
     from flowborne.solids.model import SolidModel
+    from flowborne.solids.trajectories import JointCommand
 
 Step = Callable[[World, float, "JointCommand | None"], StepReport]
 
@@ -297,8 +297,8 @@ class Simulation:
 
     def _start(self) -> None:
         """Start bodies and fluid; controlled joints keep their velocity until a decision."""
-        from flowborne.coupling.motion import JointCommand
         from flowborne.coupling.start import start
+        from flowborne.solids.trajectories import JointCommand
 
         world, scene = self._moment.world, self.scene
         model = world.setup.solid
