@@ -22,9 +22,10 @@ from flowborne.coupling.flow import AdvectionResult
 from flowborne.coupling.operators import boundary_velocity, leak_proof
 from flowborne.coupling.world import Fluid, World
 from flowborne.fluid.grid import Array, Faces, faces_of
-from flowborne.fluid.induced import Normal, brought, induced
+from flowborne.fluid.potential import Normal, brought
 from flowborne.fluid.projection import accelerated
 from flowborne.fluid.sides.side import Place
+from flowborne.fluid.wake import induced
 from flowborne.solids.dynamics import kinematics
 
 
