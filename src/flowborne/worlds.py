@@ -15,12 +15,11 @@ from typing import TypedDict, Unpack
 import numpy as np
 from scipy.interpolate import RegularGridInterpolator
 
-from flowborne.coupling.cut import cut_by_bodies, volumes_of
+from flowborne.coupling.cut import cut_by_bodies, following, volumes_of
 from flowborne.coupling.report import Outcome, StepReport
 from flowborne.coupling.start import set_going, start
 from flowborne.coupling.step import step
 from flowborne.coupling.stream import Sampled
-from flowborne.coupling.window import following
 from flowborne.coupling.world import Fluid, Setup, World
 from flowborne.fluid.boundary import Boundaries, Source
 from flowborne.fluid.control_volumes import control_volumes, face_masses

@@ -36,7 +36,7 @@ from flowborne.coupling.bodies_step import (
     position_velocity,
     step_bodies,
 )
-from flowborne.coupling.cut import cut_by_bodies, departure, jets_at
+from flowborne.coupling.cut import cut_by_bodies, departure, follow, jets_at
 from flowborne.coupling.far_field import far_field
 from flowborne.coupling.flow import (
     advect,
@@ -56,7 +56,6 @@ from flowborne.coupling.step_report import (
     momentum_balance,
     report_coupled,
 )
-from flowborne.coupling.window import follow
 from flowborne.coupling.world import World
 from flowborne.fluid.control_volumes import face_masses
 from flowborne.solids.dynamics import kinematics
