@@ -21,7 +21,7 @@ from flowborne.kernels.regions import region_loads
 from flowborne.kernels.sparse_rows import padded_rows
 from flowborne.kernels.vectors import load_cells
 from flowborne.solvers.deflation import compliant_modes, mode_amounts, mode_fields, null_basis
-from flowborne.solvers.hierarchy import borrow, prepare
+from flowborne.solvers.hierarchy import borrow
 from flowborne.solvers.mobility import Mobility, dense_mobility
 
 
@@ -116,19 +116,14 @@ class PressureSystem:
         self.slab = nz == 1
         inner = (1, nx, ny) if self.slab else self.shape
         wraps = (False, periodic[0], periodic[1]) if self.slab else periodic
-        self.periodic = np.array(wraps, np.uint8)
         x, y, z = (np.ascontiguousarray(w, np.float64) for w in weights)
         faces = (x, y, z)
         if self.slab:
             faces = (np.zeros((1, 1, 1)), x.reshape(1, nx + 1, ny), y.reshape(1, nx, ny + 1))
         self.beyond = padded_cells(beyond[0], inner), *beyond[1:]
         self._deflation: tuple[LowRankTerm, Deflation] | None = None
-        self.buffers = borrow((inner, wraps), self)
-        b = self.buffers
-        self.hierarchy = b.hierarchy(self.periodic)
-        self.regions, self.scale, self.finest = prepare(
-            self.hierarchy, faces, reaction, b.finest, b.label, b.parent, b.count
-        )
+        self.buffers = borrow(inner, wraps, self)
+        self.regions, self.scale, self.finest = self.buffers.prepare(faces, reaction)
 
     def solve(
         self,
@@ -156,7 +151,7 @@ class PressureSystem:
         load_cells(right, np.ascontiguousarray(rhs, np.float64).reshape(cells), diagonal)
         added = self.deflation(term)
         iterations, residual, converged = solve(
-            self.hierarchy,
+            b.hierarchy,
             b.cycle,
             self.finest,
             b.vectors,
@@ -199,7 +194,7 @@ class PressureSystem:
         held = null.shape[1] < self.regions
         modes = compliant_modes(mobility, rows, inverse, self.scale, max(self.shape), held)
         if modes.size:
-            fields, gram = mode_fields(self.hierarchy, b.cycle, rows, modes)
+            fields, gram = mode_fields(b.hierarchy, b.cycle, rows, modes)
             amounts = mode_amounts(modes, gram)
         return Deflation(rows, null, fields, amounts)
 
