@@ -21,7 +21,6 @@ from flowborne.kernels.levels import at_level
 from flowborne.kernels.regions import NULL
 from flowborne.kernels.sparse_rows import add_rows, row_gram, row_gram_along, sum_rows
 from flowborne.kernels.v_cycle import v_cycle
-from flowborne.kernels.vectors import scaled_cells
 from flowborne.solvers.mobility import Mobility
 
 MOST_MODES = 32
@@ -67,6 +66,7 @@ def mode_fields(
     """Y (m, padded shape) with ghosts 0, and B^T Y (m, m) for modes (k, m)."""
     x, b, _ = cycle
     z, source = at_level(x, hierarchy[0], 0), at_level(b, hierarchy[0], 0)
+    inside = tuple(slice(1, -1) if n > 1 else slice(None) for n in z.shape)
     size, count = modes.shape
     fields = np.zeros((count, *z.shape), z.dtype)
     gram = np.empty((count, count))
@@ -74,7 +74,7 @@ def mode_fields(
         source[:] = 0.0
         add_rows(source, rows, np.ascontiguousarray(modes[:, n]))
         v_cycle(hierarchy, *cycle)
-        scaled_cells(z, fields[n], 1.0)
+        fields[n][inside] = z[inside]
         gram[:, n] = sum_rows(z, rows, size) @ modes
     return fields, gram
 
