@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from flowborne.coupling.servo import Servo, ServoExact, ServoPD, TrajectoryServo
 from flowborne.motion.human.body import human_mjcf
 from flowborne.motion.human.skeleton import SIDES, standard_skeleton
 from flowborne.motion.tracks import (
@@ -30,7 +29,14 @@ from flowborne.solids.state import SolidState
 from flowborne.solids.tissue.growth import Tissue, add_flesh
 from flowborne.solids.tissue.mesh import FleshMesh
 from flowborne.solids.tissue.mesh_file import mesh_bytes, read_mesh
-from flowborne.solids.trajectories import JointCommand, Trajectory
+from flowborne.solids.trajectories import (
+    JointCommand,
+    Servo,
+    ServoExact,
+    ServoPD,
+    Trajectory,
+    TrajectoryServo,
+)
 from flowborne.solids.wind import Wind, WindFaces, WindField, WindForce
 from flowborne.solvers.cholesky import symmetric_factor
 

@@ -20,9 +20,8 @@ from flowborne.control.phases import PhaseIntervals
 from flowborne.control.rules import GoldenSection
 from flowborne.control.trial import Hypothesis
 from flowborne.coupling.report import StepReport
-from flowborne.coupling.servo import ServoExact, ServoPD
 from flowborne.coupling.world import World
-from flowborne.solids.trajectories import JointCommand
+from flowborne.solids.trajectories import JointCommand, ServoExact, ServoPD
 
 MakeWorld = Callable[..., World]
 Step = Callable[[World, float, JointCommand | None], StepReport]

@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from flowborne.coupling.drives import joint_command
 from flowborne.coupling.operators import generalised, twists
 from flowborne.coupling.report import StepReport, Timer
-from flowborne.coupling.servo import joint_command
 from flowborne.coupling.solve import solve_bodies
 from flowborne.coupling.step_report import report_bodies
 from flowborne.coupling.stream import winds_on

@@ -37,6 +37,7 @@ from flowborne.coupling.bodies_step import (
     step_bodies,
 )
 from flowborne.coupling.cut import cut_by_bodies, departure, follow, jets_at
+from flowborne.coupling.drives import joint_command
 from flowborne.coupling.far_field import far_field
 from flowborne.coupling.flow import (
     advect,
@@ -47,7 +48,6 @@ from flowborne.coupling.flow import (
 from flowborne.coupling.half_pressure import explicit_half_pressure
 from flowborne.coupling.operators import generalised
 from flowborne.coupling.report import Outcome, StepReport, Timer
-from flowborne.coupling.servo import joint_command
 from flowborne.coupling.solve import solve_together
 from flowborne.coupling.step_report import (
     blank,
