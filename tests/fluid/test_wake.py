@@ -16,7 +16,6 @@ from flowborne.fluid.wake import (
     BINS,
     across,
     after_move,
-    grouped,
     images,
     leaving,
     moved,
@@ -186,7 +185,7 @@ def test_bins_induce_what_their_vortices_do(axis: int, number: int, within: floa
     vorticity, bins = random.normal(size=(6, 3)), np.zeros((BINS, 12))
     bins[number] = binned(line.middles[number], places, vorticity)
     edges = edges_of(Place(ROOM, (axis + 1) % 3, False), axis)
-    found = potential(grouped(line, bins), edges, axis)
+    found = potential(line, bins, edges, axis)
     expected = of_vortices(places, vorticity, edges, axis)
     np.testing.assert_allclose(found, expected, atol=within * np.abs(expected).max() + 1e-5)
 
@@ -265,7 +264,7 @@ def test_the_wake_of_a_room_stays_in_the_world_when_the_domain_moves(
     def induced(grid: Grid, wake: Array, axis: int) -> Array:
         sea = sides.sea(grid)
         assert sea is not None
-        return potential(grouped(wake_line(sea), wake[1]), away, axis)
+        return potential(wake_line(sea), wake[1], away, axis)
 
     here, wake = grid, bins
     for axis, cells in enumerate(way):

@@ -61,21 +61,19 @@ def induced(field: Faces, sea: Sea, wake: Array, dt: float) -> tuple[Normal, Arr
     grid, later = sea.far[0].grid, np.zeros(wake.shape)
     circulation = circulations(field, grid)
     sides = potentials(circulation, grid, sea.mirrors)
-    ends: Normal = {place: np.zeros(()) for place in sea.driven}
-    if sea.exit is not None:
-        line, number = wake_line(sea), number_of(sea.exit)
-        inside = grid.depth * np.array([edges.sum() for edges in circulation.values()])
-        bins = with_all_circulation_0(wake[number], inside)
-        whole = bins * images(sea.mirrors, grid)
-        for place in sea.driven:
-            for axis, values in of_wake(line, whole, place).items():
-                sides[place][axis] += values.reshape(sides[place][axis].shape)
-            ends[place] = end_velocity(line, whole, place)
-        rate, speed = leaving(circulation, field, sea.exit, line)
-        later[number] = moved(bins, dt * rate, min(1.0, speed * dt / line.length))
-    return {
-        place: normal_velocity(sides[place], place) + ends[place] for place in sea.driven
-    }, later
+    if sea.exit is None:
+        return {place: normal_velocity(sides[place], place) for place in sea.driven}, later
+    line, number = wake_line(sea), number_of(sea.exit)
+    inside = grid.depth * np.array([edges.sum() for edges in circulation.values()])
+    bins = with_all_circulation_0(wake[number], inside)
+    whole, normal = bins * images(sea.mirrors, grid), {}
+    for place in sea.driven:
+        for axis, values in of_wake(line, whole, place).items():
+            sides[place][axis] += values.reshape(sides[place][axis].shape)
+        normal[place] = normal_velocity(sides[place], place) + end_velocity(line, whole, place)
+    rate, speed = leaving(circulation, field, sea.exit, line)
+    later[number] = moved(bins, dt * rate, min(1.0, speed * dt / line.length))
+    return normal, later
 
 
 def after_move(wake: Array, velocity: Faces, before: Sea | None, after: Sea | None) -> Array:
@@ -209,8 +207,8 @@ def of_wake(line: WakeLine, bins: Array, place: Place) -> OnEdges:
     """Tangential components of A of the bins on the edges of a side, each (n,), m^2/s."""
     if place.grid.is_slab:
         return {2: stream_function(line, bins, edges_of(place, 2))}
-    groups, axes = grouped(line, bins), (axis for axis in range(3) if axis != place.axis)
-    return {axis: potential(groups, edges_of(place, axis), axis) for axis in axes}
+    axes = (axis for axis in range(3) if axis != place.axis)
+    return {axis: potential(line, bins, edges_of(place, axis), axis) for axis in axes}
 
 
 def stream_function(line: WakeLine, bins: Array, nodes: Array) -> Array:
@@ -225,25 +223,15 @@ def stream_function(line: WakeLine, bins: Array, nodes: Array) -> Array:
     return np.asarray((moment - 0.5 * circulation + source * angle) / (2.0 * np.pi))
 
 
-Groups = tuple[Array, Array, Array]
-"""(k, 3) middles, m, and (k, 3) G and (k, 3, 3) M_ji of what acts together."""
-
-
-def grouped(line: WakeLine, bins: Array) -> Groups:
-    """The GROUPS of bins (BINS, 12)."""
+def potential(line: WakeLine, bins: Array, edges: Array, axis: int) -> Array:
+    """(n,) component of the bins (BINS, 12) on edges (n, 3) along an axis, m^2/s, by GROUPS."""
     first = np.cumsum(GROUPS) - GROUPS
     middle = first + 0.5 * GROUPS
-    circulation, moment = bins[:, :3], bins[:, 3:].reshape(-1, 3, 3)
+    own, moment = bins[:, axis], bins[:, 3 + axis :: 3]
     off = line.length * (np.arange(BINS) + 0.5 - np.repeat(middle, GROUPS))
-    shifted = moment + np.einsum("k,j,ki->kji", off, line.along, circulation)
-    return (line.at(middle), np.add.reduceat(circulation, first), np.add.reduceat(shifted, first))
-
-
-def potential(groups: Groups, edges: Array, axis: int) -> Array:
-    """(n,) component of A on edges (n, 3) along an axis, m^2/s."""
-    middles, circulation, moment = groups
-    out, (own, arms) = np.empty(len(edges)), (circulation[:, axis], moment[:, :, axis])
-    wake_potential(out, edges, middles, np.ascontiguousarray(own), np.ascontiguousarray(arms))
+    arms = moment + np.einsum("k,j,k->kj", off, line.along, own)
+    sums, out = (np.add.reduceat(each, first) for each in (own, arms)), np.empty(len(edges))
+    wake_potential(out, edges, line.at(middle), *sums)
     return out
 
 
