@@ -43,15 +43,16 @@ def cut_by_bodies(world: World, pose: Kinematics | None = None) -> Geometry:
 def cut_at(setup: Setup, pose: Kinematics) -> Geometry:
     """The grid cut by the bodies in a pose."""
     assert setup.fluid is not None
+    grid, sides = setup.fluid.grid, setup.fluid.boundaries
     flesh = None if setup.fluid.one_way else setup.solid.flesh
     return geometry(
         setup.shapes,
         pose.geom_position[setup.shapes.source],
         pose.geom_rotation[setup.shapes.source],
-        skins_on(setup.fluid.grid, setup.fluid.boundaries, flesh, pose.vertices),
+        skins_on(grid, sides, flesh, pose.vertices, setup.solid.nbody),
         setup.solid.nbody,
-        setup.fluid.grid,
-        setup.fluid.boundaries,
+        grid,
+        sides,
     )
 
 
