@@ -41,11 +41,12 @@ MAX_PIXELS = 1 << 26
 class Accessors:
     """The arrays of a document.
 
+    name, document, buffers  of the file
     raises  SceneError when one of them lies outside its view or its buffer
     """
 
     def __init__(self, name: str, document: Document, buffers: list[memoryview]) -> None:
-        self._name, self._document, self._buffers = name, document, buffers
+        self.name, self.document, self.buffers = name, document, buffers
         for number, view in enumerate(document.buffer_views):
             where = f"{name}, bufferViews[{number}]"
             within(view.buffer, buffers, f"{where}.buffer", "buffers")
@@ -55,16 +56,9 @@ class Accessors:
         for number, accessor in enumerate(document.accessors):
             self._check(accessor, f"{name}, accessors[{number}]")
 
-    def __len__(self) -> int:
-        return len(self._document.accessors)
-
-    def table(self, number: int) -> Accessor:
-        """An accessor of the document."""
-        return self._document.accessors[number]
-
     def read(self, number: int) -> NDArray[Any]:
         """(count, width) the elements of an accessor; normalized integers become floats."""
-        accessor = self.table(number)
+        accessor = self.document.accessors[number]
         kind, width = np.dtype(KINDS[accessor.component_type]), WIDTHS[accessor.type]
         if accessor.buffer_view is None:
             values = np.zeros((accessor.count, width), kind)
@@ -82,22 +76,45 @@ class Accessors:
             return np.maximum(values.astype(float) / largest, -1.0)
         return values
 
-    def numbers(self, number: int, where: str) -> Array:
-        """(count, width) the elements as floats; raises SceneError unless all are finite."""
+    def numbers(self, number: int, type_: str | None, kinds: tuple[int, ...], where: str) -> Array:
+        """(count, width) the elements as floats.
+
+        raises  SceneError unless all are finite, of a type and of one of some component types
+        """
+        self._check_kind(number, type_, kinds, where)
         values = self.read(number).astype(float)
         if not np.isfinite(values).all():
             row = int(np.flatnonzero(~np.isfinite(values).all(axis=1))[0])
             raise wrong(f"{where} (accessors[{number}]): element {row} is not a finite number")
         return values
 
-    def indices(self, number: int, count: int, where: str, what: str) -> Integers:
-        """(count, width) the elements as integers; raises SceneError for one from `count` on."""
+    def indices(
+        self, number: int, type_: str, kinds: tuple[int, ...], limit: tuple[int, str], where: str
+    ) -> Integers:
+        """(count, width) the elements as integers; as `numbers`.
+
+        limit   number of things that they are indices of, and what these are
+        raises  SceneError for an index without a thing
+        """
+        self._check_kind(number, type_, kinds, where)
         values = self.read(number).astype(np.int64)
-        if (largest := int(values.max())) >= count:
+        if (largest := int(values.max())) >= limit[0]:
             raise wrong(
-                f"{where} (accessors[{number}]) has index {largest}, but there are {count} {what}"
+                f"{where} (accessors[{number}]) has index {largest}, but there are {limit[0]} "
+                f"{limit[1]}"
             )
         return values
+
+    def _check_kind(
+        self, number: int, type_: str | None, kinds: tuple[int, ...], where: str
+    ) -> None:
+        within(number, self.document.accessors, where, "accessors")
+        accessor = self.document.accessors[number]
+        if accessor.type != (type_ or accessor.type) or accessor.component_type not in kinds:
+            raise wrong(
+                f"{where} (accessors[{number}]) is {accessor.type} of components "
+                f"{accessor.component_type}, not {type_} of {' or '.join(map(str, kinds))}"
+            )
 
     def _check(self, accessor: Accessor, where: str) -> None:
         kind, width = np.dtype(KINDS[accessor.component_type]), WIDTHS[accessor.type]
@@ -132,7 +149,7 @@ class Accessors:
         self, number: int, first: int, kind: np.dtype[Any], count: int, width: int, where: str
     ) -> None:
         """Raise SceneError unless `count` elements lie within a view."""
-        views = self._document.buffer_views
+        views = self.document.buffer_views
         within(number, views, f"{where}.bufferView", "bufferViews")
         size = width * kind.itemsize
         step = views[number].byte_stride or size
@@ -148,12 +165,12 @@ class Accessors:
     def _view(
         self, number: int, first: int, kind: np.dtype[Any], count: int, width: int
     ) -> NDArray[Any]:
-        view = self._document.buffer_views[number]
+        view = self.document.buffer_views[number]
         step = view.byte_stride or width * kind.itemsize
         return np.ndarray(
             (count, width),
             kind,
-            self._buffers[view.buffer],
+            self.buffers[view.buffer],
             view.byte_offset + first,
             (step, kind.itemsize),
         )
@@ -162,11 +179,8 @@ class Accessors:
 class Colours:
     """The colours of a document's meshes."""
 
-    def __init__(
-        self, name: str, document: Document, arrays: Accessors, buffers: list[memoryview]
-    ) -> None:
-        self._name, self._document, self._arrays = name, document, arrays
-        self._buffers = buffers
+    def __init__(self, arrays: Accessors) -> None:
+        self._name, self._document, self._arrays = arrays.name, arrays.document, arrays
         self._images: dict[int, Image.Image | None] = {}
 
     def of(self, part: Primitive, triangles: Integers, points: int) -> Array:
@@ -195,8 +209,7 @@ class Colours:
             return np.ones((len(triangles), 3))
         within(source, self._document.images, f"{self._name}, textures[{texture.index}]", "images")
         where = f"{self._name}, {layer}"
-        within(part.attributes[layer], self._arrays, where, "accessors")
-        coordinates = self._arrays.numbers(part.attributes[layer], where)
+        coordinates = self._arrays.numbers(part.attributes[layer], None, tuple(KINDS), where)
         if coordinates.shape != (points, 2):
             raise wrong(f"{where} is not a pair of numbers for each of the {points} points")
         if source not in self._images:
@@ -212,7 +225,7 @@ class Colours:
             if image.buffer_view is not None:
                 view = self._document.buffer_views[image.buffer_view]
                 end = view.byte_offset + view.byte_length
-                content = bytes(self._buffers[view.buffer][view.byte_offset : end])
+                content = bytes(self._arrays.buffers[view.buffer][view.byte_offset : end])
             else:
                 content = embedded(image.uri or "")
             found = Image.open(BytesIO(content))

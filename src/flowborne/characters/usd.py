@@ -1,11 +1,16 @@
 """Skins, weights and animations of UsdSkel, by usd-core.
 
+As a program, it is the process in which `usd_gate.probe` reads a binary file first, because reading
+may crash.
+
 source  OpenUSD, UsdSkel schemas: binding API, SkelAnimation
 """
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cached_property, wraps
 from pathlib import Path
 from typing import Any, TypeVar
@@ -34,6 +39,7 @@ from flowborne.characters.rig import (
     unique_names,
 )
 from flowborne.characters.usd_gate import (
+    EVERYTHING,
     check_faces,
     check_influences,
     check_samples,
@@ -45,7 +51,8 @@ from flowborne.characters.usd_gate import (
 
 Result = TypeVar("Result")
 
-EVERYTHING = Usd.TraverseInstanceProxies(Usd.PrimAllPrimsPredicate)
+MAX_MEMORY = 8 << 30
+"""Limit of the address space of that process, bytes; Windows has no such limit."""
 
 
 def _reading(method: Callable[..., Result]) -> Callable[..., Result]:
@@ -252,3 +259,22 @@ def _triangles(mesh: UsdGeom.Mesh, points: int, mirrored: bool, where: str) -> I
     ]
     triangles = np.array(fans, np.int64).reshape(-1, 3)
     return triangles[:, ::-1] if mirrored else triangles
+
+
+def read_all(path: Path) -> None:
+    """Read all that an import reads. The calling process reports errors."""
+    if sys.platform != "win32":
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_AS, (MAX_MEMORY, MAX_MEMORY))
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    with suppress(SceneError):
+        source = UsdSource(path, probed=True)
+        _ = source.rig, source.surface
+        for clip in range(len(source.clips)):
+            with suppress(SceneError):
+                source.action(clip)
+
+
+if __name__ == "__main__":
+    read_all(Path(sys.argv[1]))

@@ -23,6 +23,8 @@ from flowborne.base.errors import SceneError
 from flowborne.characters.limits import MAX_FILE_BYTES, MAX_POSES
 from flowborne.characters.rig import Array, Integers
 
+EVERYTHING = Usd.TraverseInstanceProxies(Usd.PrimAllPrimsPredicate)
+
 MAX_LAYERS = 1000
 MAX_PRIMS = 100_000
 
@@ -61,8 +63,7 @@ def open_stage(path: Path, *, probed: bool = False) -> Usd.Stage:
                 "(usdcat --flatten)."
             )
     stage = Usd.Stage.Open(str(path))
-    everything = Usd.TraverseInstanceProxies(Usd.PrimAllPrimsPredicate)
-    for number, _ in enumerate(Usd.PrimRange.Stage(stage, everything)):
+    for number, _ in enumerate(Usd.PrimRange.Stage(stage, EVERYTHING)):
         if number >= MAX_PRIMS:
             raise SceneError(
                 f"{path.name} has more than {MAX_PRIMS:,} prims. Export the character alone."
@@ -72,7 +73,7 @@ def open_stage(path: Path, *, probed: bool = False) -> Usd.Stage:
 
 def probe(path: Path) -> None:
     """Raise SceneError unless another process can read a file."""
-    command = [sys.executable, "-P", "-m", "flowborne.characters.usd_process", str(path)]
+    command = [sys.executable, "-P", "-m", "flowborne.characters.usd", str(path)]
     nowhere = subprocess.DEVNULL
     try:
         done = subprocess.run(
