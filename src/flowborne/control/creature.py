@@ -14,7 +14,7 @@ from flowborne.coupling.motion import JointCommand
 from flowborne.coupling.servo import Servo
 from flowborne.kernels.arrays import Array, Integers, Mask
 from flowborne.solids.following import follow, outboard_dofs, rigidify
-from flowborne.solids.state import SolidState
+from flowborne.solids.model import SolidState
 
 if TYPE_CHECKING:
     from flowborne.coupling.world import Setup, World

@@ -36,8 +36,7 @@ from flowborne.control.surroundings import Surroundings
 from flowborne.coupling.motion import Trajectory
 from flowborne.kernels.arrays import Array, Integers
 from flowborne.motion.tracks import Curve, TrajectoryConstant, TrajectoryKeyframes
-from flowborne.solids.joint_kinds import HINGE, JOINT_KINDS, SLIDE, joint_kind
-from flowborne.solids.model import SolidModel
+from flowborne.solids.model import HINGE, JOINT_KINDS, SLIDE, SolidModel, joint_kind
 
 Direction = tuple[float, float, float]
 Names = Annotated[tuple[Text, ...], Field(min_length=1)]

@@ -17,7 +17,7 @@ from flowborne.fluid.ghosts import edge
 from flowborne.fluid.grid import Array, Faces
 from flowborne.fluid.state import FluidState
 from flowborne.solids.dynamics import Kinematics, kinematics
-from flowborne.solids.state import SolidState
+from flowborne.solids.model import SolidState
 
 
 def cut_by_bodies(world: World, pose: Kinematics | None = None) -> Geometry:

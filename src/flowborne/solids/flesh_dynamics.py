@@ -16,10 +16,9 @@ from scipy.sparse import csc_array, csr_array, dia_array
 from flowborne.kernels.arrays import Array, Indices, Integers
 from flowborne.solids.constraints import rows_of
 from flowborne.solids.dynamics import System, centred
-from flowborne.solids.model import SolidModel
-from flowborne.solids.momentum import halfway
+from flowborne.solids.model import SolidModel, SolidState
+from flowborne.solids.momentum import Halfway
 from flowborne.solids.scratch import Scratch, scratch
-from flowborne.solids.state import SolidState
 
 
 @dataclass(frozen=True)
@@ -90,9 +89,9 @@ def assemble_flesh(
     still = A @ v
     centre, own = None, still + dt * force
     if before is not None:
-        centre = halfway(model, s, before, state, dt, still, M, force + s.bias)
+        centre = Halfway(model, s, before, state, dt, still, M, force + s.bias)
         own, _ = centre.impulse(v)
-    # `halfway` has changed the pose in `s`, and rows need the whole forward pass at `state`
+    # `Halfway` has changed the pose in `s`, and rows need the whole forward pass at `state`
     rows, zones = None, np.zeros(0, np.int64)
     if s.data.nefc:
         s.forward(state.q, state.v, applied)

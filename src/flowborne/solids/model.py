@@ -1,8 +1,10 @@
-"""The articulated body: immutable, shared by all copies of a world."""
+"""The articulated body: immutable, shared by all copies of a world; and its state."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
@@ -17,7 +19,6 @@ from flowborne.solids import displaced, geoms, mjcf
 from flowborne.solids.flesh import flesh_of, points_of_flesh
 from flowborne.solids.geoms import own_by_mesh
 from flowborne.solids.mjcf import NOTHING, Given
-from flowborne.solids.state import SolidState
 from flowborne.solids.tissue.growth import Grown
 from flowborne.solvers.cholesky import Ordering
 
@@ -34,6 +35,22 @@ SUFFIXES = {
     HINGE: ("",),
 }
 WIDTHS = {FREE: 7, BALL: 4, SLIDE: 1, HINGE: 1}
+JOINT_KINDS = {HINGE: "hinge", SLIDE: "slide", BALL: "ball joint", FREE: "free joint"}
+
+
+@dataclass
+class SolidState:
+    """Positions and velocities of the articulated bodies in generalised coordinates.
+
+    q  (nq,) MuJoCo's qpos: m, rad, unit quaternions
+    v  (nv,) MuJoCo's qvel: m/s, rad/s
+    """
+
+    q: Array
+    v: Array
+
+    def copy(self) -> SolidState:
+        return SolidState(self.q.copy(), self.v.copy())
 
 
 class SolidModel:
@@ -93,8 +110,9 @@ class SolidModel:
         self.subtree_mass: Array = np.array(mj.body_subtreemass)
         self.body_names = _names(mj, mujoco.mjtObj.mjOBJ_BODY, self.nbody)
         self._bodies = {name: b for b, name in enumerate(self.body_names)}
+        self._rest = geoms.rest_poses(mj)
         self._set_dofs()
-        self.flesh = flesh_of(self, grown) if grown else None
+        self.flesh = flesh_of(self, slab, grown) if grown else None
         self._set_geoms()
         self._set_displaced()
 
@@ -114,7 +132,7 @@ class SolidModel:
         given    densities, shapes and choices in addition to the file
         raises   ValueError when the model is bad
         """
-        return cls(mjcf.compiled(Path(path), slab, gravity, given), slab, shapes=given.shapes)
+        return cls(mjcf.bones_of(Path(path), slab, gravity, given)[1], slab, shapes=given.shapes)
 
     @classmethod
     def from_string(
@@ -128,7 +146,7 @@ class SolidModel:
     ) -> SolidModel:
         """Model of an MJCF text; as `from_file`."""
         given = Given(density, shapes=shapes)
-        return cls(mjcf.compiled(xml, slab, gravity, given), slab, shapes=shapes)
+        return cls(mjcf.bones_of(xml, slab, gravity, given)[1], slab, shapes=shapes)
 
     @classmethod
     def with_flesh(
@@ -249,14 +267,14 @@ class SolidModel:
 
     def rest_pose(self, geom: int) -> tuple[Array, float]:
         """A geometry at rest: (3, 3) its frame to the world's, and the height of its centre, m."""
-        _, _, position, rotation = geoms.rest_poses(self.mj)
+        _, _, position, rotation = self._rest
         g = int(self.geom_id[geom])
         return rotation[g], float(position[g, 2])
 
     def section_of(self, geom: int) -> Section:
         """Cross-section of a geometry of a slab, in the frame of the geometry."""
         g = int(self.geom_id[geom])
-        _, _, position, rotation = geoms.rest_poses(self.mj)
+        _, _, position, rotation = self._rest
         return mjcf.slab_section(self.mj, g, position[g], rotation[g])
 
     def _set_dofs(self) -> None:
@@ -304,7 +322,7 @@ class SolidModel:
         self.geom_rgba: Array = mj.geom_rgba[self.geom_id].astype(np.float64)
         self.geom_covered: Mask = np.zeros(self.ngeom, bool)
         if self.flesh is not None:
-            _, _, position, rotation = geoms.rest_poses(mj)
+            _, _, position, rotation = self._rest
             for n, (shape, g) in enumerate(zip(self.geom_shape, chosen, strict=True)):
                 points = position[g] + shape.landmarks() @ rotation[g].T
                 outside = distances_to_mesh(points, self.flesh.rest, self.flesh.surface)
@@ -313,7 +331,7 @@ class SolidModel:
     def _set_displaced(self) -> None:
         self.volume: Array = np.zeros(self.nbody)
         self.centroid: Array = np.zeros((self.nbody, 3))
-        body_position, body_rotation, position, rotation = geoms.rest_poses(self.mj)
+        body_position, body_rotation, position, rotation = self._rest
         for body in range(self.nbody):
             solids = [
                 self._solid(int(g), position[self.geom_id[g]], rotation[self.geom_id[g]])
@@ -338,6 +356,16 @@ class SolidModel:
         box = geoms.box_of(self.mj, g, position, rotation)
         centroid = position + rotation @ centre
         return displaced.Solid(shape, position, rotation, *box, volume, centroid)
+
+
+def joint_kind(model: SolidModel, joint: str) -> int:
+    """MuJoCo's number of the joint's kind."""
+    return int(model.mj.jnt_type[model.joint(joint)])
+
+
+def joint_unit(model: SolidModel, joint: str) -> float:
+    """SI value of one unit in a scene: pi / 180 rad of a degree, or 1 m for a slide."""
+    return 1.0 if joint_kind(model, joint) == SLIDE else math.pi / 180.0
 
 
 def _bones(mj: mujoco.MjModel, grown: Sequence[Grown]) -> int:

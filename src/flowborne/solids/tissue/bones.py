@@ -14,8 +14,8 @@ from flowborne.base.phrases import suggestion
 from flowborne.kernels.arrays import Array
 from flowborne.shapes.mesh import ShapeMesh
 from flowborne.shapes.shape import Mesh, Shape
-from flowborne.solids.compiler import compiled_quietly
 from flowborne.solids.geoms import box_of, displacing_geoms, element_name, geom_shape, rest_poses
+from flowborne.solids.mjcf import compiled_quietly
 
 MOST_SAMPLES = 2_000_000
 """Most samples of a lattice; a finer lattice is made coarser."""
