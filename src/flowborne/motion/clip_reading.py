@@ -178,12 +178,12 @@ def _person(path: Path, stamp: tuple[int, int], how: Reading) -> Capture:
     length = leg_length(raw, mapping)
     unit = likely_unit(length) if how.unit is None else how.unit
     check_scale(length, unit)
-    up = how.up or standing_axis(posture_of(raw, mapping).up, "y") or "y"
+    up = how.up or standing_axis(posture_of(raw, mapping)[1], "y") or "y"
     clip = clip_of(bvh, unit, up, how.skip, mapping["root"])
     used = {number for joint in mapping.values() for number in clip.lineage(joint)} - {0}
     check_rigid(bvh, clip, sorted(clip.names[n] for n in used), MAX_PERSON_STRETCH)
-    posture = posture_of(clip, mapping)
-    clip = relative_to_pose(clip, posture.rest)
+    rest, posture = posture_of(clip, mapping)
+    clip = relative_to_pose(clip, rest)
     skeleton = skeleton_of(clip, mapping, between(clip, mapping))
     links = {link.name: link.bone for links in skeleton.links.values() for link in links}
     height = clip.translation[:, 2]
@@ -195,8 +195,8 @@ def _person(path: Path, stamp: tuple[int, int], how: Reading) -> Capture:
         skeleton,
         unit,
         up,
-        rest=posture.rest,
-        posture=posture.up,
+        rest=rest,
+        posture=posture,
         lift=clip.translation[:, 2] - height,
         held=tuple(joint for joint in JOINTS if joint not in mapping),
         note=bvh.note,
