@@ -29,7 +29,7 @@ from flowborne.base.version import __version__
 from flowborne.formats.creature import Creature, ModelSkin, Skeleton, Surface, quaternions
 from flowborne.formats.morphs import strongest
 from flowborne.formats.vdb import write_states
-from flowborne.kernels.arrays import Array
+from flowborne.kernels.arrays import Array, Integers
 from flowborne.motion.quaternions import continuous
 from flowborne.runs.exporters import Written, provided
 from flowborne.runs.open_run import OpenRun
@@ -138,19 +138,15 @@ def _creature(stage: Usd.Stage, creature: Creature) -> None:
     names = Names()
     for surface in creature.seen:
         if surface.bone >= 0:
-            mesh = _mesh(stage, parent.AppendChild(names.of(surface.name)), surface)
-            _set_points(mesh, surface.vertices)
-            _bind(mesh, np.array([[surface.bone]]), np.ones((1, 1)), rigid=True)
+            path = parent.AppendChild(names.of(surface.name))
+            _bound(stage, path, surface, np.array([[surface.bone]]), np.ones((1, 1)), rigid=True)
     for bound in creature.bound:
-        mesh = _mesh(stage, parent.AppendChild(names.of(bound.name)), bound)
-        _set_points(mesh, bound.vertices)
-        _bind(mesh, *strongest(bound.weights, INFLUENCES), rigid=False)
+        path = parent.AppendChild(names.of(bound.name))
+        _bound(stage, path, bound, *strongest(bound.weights, INFLUENCES))
     for skin in creature.skins:
         guides = UsdGeom.Scope.Define(stage, parent.AppendChild("Bound")).GetPath()
-        mesh = _mesh(stage, guides.AppendChild(names.of(skin.name)), skin)
-        mesh.CreatePurposeAttr(UsdGeom.Tokens.guide)
-        _set_points(mesh, skin.vertices)
-        _bind(mesh, *strongest(skin.weights, INFLUENCES), rigid=False)
+        path = guides.AppendChild(names.of(skin.name))
+        _bound(stage, path, skin, *strongest(skin.weights, INFLUENCES), guide=True)
     names = Names()
     for surface in creature.surfaces:
         if surface.bone < 0:
@@ -329,15 +325,27 @@ def _set_points(prim: UsdGeom.PointBased, points: NDArray[Any], frame: int | Non
     prim.CreateExtentAttr().Set(extent, time)
 
 
-def _bind(mesh: UsdGeom.Mesh, bones: NDArray[np.int64], weights: Array, *, rigid: bool) -> None:
-    """Bind a mesh in the rest pose to bones (k, m) with weights (k, m)."""
+def _bound(
+    stage: Usd.Stage,
+    path: Sdf.Path,
+    shown: Surface | ModelSkin,
+    bones: Integers,
+    weights: Array,
+    *,
+    rigid: bool = False,
+    guide: bool = False,
+) -> None:
+    """A mesh in the rest pose, bound to bones (k, m) with weights (k, m)."""
+    mesh = _mesh(stage, path, shown)
+    if guide:
+        mesh.CreatePurposeAttr(UsdGeom.Tokens.guide)
+    _set_points(mesh, shown.vertices)
     binding = UsdSkel.BindingAPI.Apply(mesh.GetPrim())
     binding.CreateGeomBindTransformAttr(Gf.Matrix4d(1.0))
-    count = bones.shape[1]
     numbers = Vt.IntArray.FromNumpy(bones.astype(np.int32).ravel())
-    binding.CreateJointIndicesPrimvar(rigid, count).Set(numbers)
+    binding.CreateJointIndicesPrimvar(rigid, bones.shape[1]).Set(numbers)
     shares = Vt.FloatArray.FromNumpy(weights.astype(np.float32).ravel())
-    binding.CreateJointWeightsPrimvar(rigid, count).Set(shares)
+    binding.CreateJointWeightsPrimvar(rigid, bones.shape[1]).Set(shares)
 
 
 def _vectors(values: NDArray[Any]) -> Vt.Vec3fArray:

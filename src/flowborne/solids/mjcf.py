@@ -253,7 +253,10 @@ def read_spec(source: str | Path, packages: Sequence[Path] = ()) -> MjSpec:
     try:
         if isinstance(source, str):
             return MjSpec.from_string(source)
-        spec = MjSpec.from_file(files.name, vfs=files.in_memory())
+        memory = mujoco.MjVfs()
+        for name, content in (files.texts | files.assets).items():
+            memory[name] = content
+        spec = MjSpec.from_file(files.name, vfs=memory)
     except ValueError as error:
         raise _unreadable(where, error) from error
     spec.assets = files.assets

@@ -14,7 +14,6 @@ import numpy as np
 from flowborne.kernels.arrays import Array, Integers, Mask
 from flowborne.kernels.triangles import distances_to_mesh
 from flowborne.shapes.own import PlacedShape
-from flowborne.shapes.section import Section
 from flowborne.solids import displaced, geoms, mjcf
 from flowborne.solids.flesh import flesh_of, points_of_flesh
 from flowborne.solids.geoms import own_by_mesh
@@ -34,7 +33,6 @@ SUFFIXES = {
     SLIDE: ("",),
     HINGE: ("",),
 }
-WIDTHS = {FREE: 7, BALL: 4, SLIDE: 1, HINGE: 1}
 JOINT_KINDS = {HINGE: "hinge", SLIDE: "slide", BALL: "ball joint", FREE: "free joint"}
 
 
@@ -247,15 +245,11 @@ class SolidModel:
 
     def dofs_of(self, joint: str) -> Integers:
         """Dofs of a joint. Raises ValueError for an unknown name."""
-        j = self.joint(joint)
-        first = int(self.mj.jnt_dofadr[j])
-        return np.arange(first, first + len(SUFFIXES[int(self.mj.jnt_type[j])]))
+        return (self._joint_of_dof == self.joint(joint)).nonzero()[0]
 
     def positions_of(self, joint: str) -> Integers:
         """Indices in q of a joint: 7 for a free joint, 4 for a ball, else 1."""
-        j = self.joint(joint)
-        first = int(self.mj.jnt_qposadr[j])
-        return np.arange(first, first + WIDTHS[int(self.mj.jnt_type[j])])
+        return (self._joint_of_index == self.joint(joint)).nonzero()[0]
 
     def joint(self, name: str) -> int:
         """Number of a joint. Raises ValueError for an unknown name."""
@@ -271,30 +265,21 @@ class SolidModel:
         g = int(self.geom_id[geom])
         return rotation[g], float(position[g, 2])
 
-    def section_of(self, geom: int) -> Section:
-        """Cross-section of a geometry of a slab, in the frame of the geometry."""
-        g = int(self.geom_id[geom])
-        _, _, position, rotation = self._rest
-        return mjcf.slab_section(self.mj, g, position[g], rotation[g])
-
     def _set_dofs(self) -> None:
         mj = self.mj
         self.joint_names = _names(mj, mujoco.mjtObj.mjOBJ_JOINT, mj.njnt)
         self._joints = {name: j for j, name in enumerate(self.joint_names)}
-        widths = [WIDTHS[int(kind)] for kind in mj.jnt_type]
+        widths = np.diff(mj.jnt_qposadr, append=mj.nq)
         self._joint_of_index = np.repeat(np.arange(mj.njnt), widths)
         self._joint_of_dof = np.array(mj.dof_jntid, dtype=np.int64)
-        names: list[str] = []
+        named = zip(self.joint_names, mj.jnt_type, strict=True)
+        self.dof_names = tuple(name + suffix for name, kind in named for suffix in SUFFIXES[kind])
+        scalar = np.isin(mj.jnt_type, (SLIDE, HINGE))
+        limited = scalar & (mj.jnt_limited != 0)
         self.dof_position: Integers = np.full(self.nv, -1)
+        self.dof_position[mj.jnt_dofadr[scalar]] = mj.jnt_qposadr[scalar]
         self.dof_range: Array = np.tile([-np.inf, np.inf], (self.nv, 1))
-        for j, name in enumerate(self.joint_names):
-            kind, first = int(mj.jnt_type[j]), int(mj.jnt_dofadr[j])
-            names += [name + suffix for suffix in SUFFIXES[kind]]
-            if kind in (SLIDE, HINGE):
-                self.dof_position[first] = mj.jnt_qposadr[j]
-                if mj.jnt_limited[j]:
-                    self.dof_range[first] = mj.jnt_range[j]
-        self.dof_names = tuple(names)
+        self.dof_range[mj.jnt_dofadr[limited]] = mj.jnt_range[limited]
         self.dof_body: Integers = np.array(mj.dof_bodyid, dtype=np.int64)
         self.dof_root: Integers = mj.body_rootid[self.dof_body].astype(np.int64)
         self.moves: Mask = np.zeros((self.nbody, self.nv), bool)

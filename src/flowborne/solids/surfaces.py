@@ -56,8 +56,9 @@ def surfaces(model: SolidModel) -> Patches:
 def _surfaces(model: SolidModel) -> Patches:
     bodies, centres, vectors = [np.zeros(0, np.int64)], [np.zeros((0, 3))], [np.zeros((0, 3))]
     for g in np.argsort(model.geom_body, kind="stable"):
+        shape = model.geom_shape[g]
         centre, vector = (
-            _outline(model.section_of(int(g))) if model.slab else model.geom_shape[g].patches()
+            _outline(shape.section(*model.rest_pose(g))) if model.slab else shape.patches()
         )
         rotation = model.geom_rotation[g]
         centres.append(model.geom_offset[g] + centre @ rotation.T)
