@@ -15,9 +15,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
 from flowborne.base.errors import SceneError
-from flowborne.characters.gltf_buffers import Accessors, Colours, within, wrong
+from flowborne.characters.gltf_buffers import Accessors, Colours, within
 from flowborne.characters.gltf_document import Node, Primitive, Sampler, Skin, read_document
-from flowborne.characters.limits import check_size
+from flowborne.characters.limits import check_size, wrong
 from flowborne.characters.rig import (
     Z_UP,
     Action,
@@ -152,7 +152,7 @@ class GltfSource:
         try:
             world = self._worlds(times, curves)[:, self._joints]
         except ValueError as error:  # a spline of quaternions goes through 0
-            raise SceneError(f"{where} has a quaternion of length 0. Export it again.") from error
+            raise wrong(f"{where} has a quaternion of length 0") from error
         return sampled_action(times, world, where)
 
     @cached_property

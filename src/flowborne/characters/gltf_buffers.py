@@ -19,6 +19,7 @@ from PIL import Image
 from flowborne.base.colours import to_linear, to_srgb
 from flowborne.base.errors import SceneError
 from flowborne.characters.gltf_document import Document, Primitive, TextureInfo, embedded
+from flowborne.characters.limits import wrong
 from flowborne.characters.rig import PLAIN, Array, Integers
 
 KINDS = {
@@ -233,8 +234,3 @@ def within(number: int, things: Any, where: str, what: str) -> None:
     """Raise SceneError unless a list has an entry of this number."""
     if number >= len(things):
         raise wrong(f"{where} is {number}, but the file has {len(things)} {what}")
-
-
-def wrong(said: str) -> SceneError:
-    """The error of a file that contradicts itself."""
-    return SceneError(f"{said}. Export it again.")

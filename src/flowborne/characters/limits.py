@@ -40,6 +40,11 @@ MAX_NAME_LENGTH = 100
 """Characters of a joint's name."""
 
 
+def wrong(said: str) -> SceneError:
+    """The error of a file that contradicts itself."""
+    return SceneError(f"{said}. Export it again.")
+
+
 def check_size(joints: int, vertices: int, where: str) -> None:
     """Raise SceneError for more joints, vertices or weights than an import can process."""
     for count, most, what in (
