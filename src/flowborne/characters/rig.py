@@ -125,8 +125,11 @@ def scaled(rig: Rig, surface: Surface, scale: float, name: str) -> tuple[Rig, Su
 def size_notes(vertices: Array, mass: float, scale: float, name: str) -> Iterator[str]:
     """A note if a surface (k, 3), m, is far longer than any animal.
 
-    mass    kg scale   already applied to the surface name    of its file, for messages raises
-    SceneError when it is far smaller than any animal: MuJoCo refuses the inertia of its parts
+    mass    kg
+    scale   already applied to the surface
+    name    of its file, for messages
+    raises  SceneError when it is far smaller than any animal: MuJoCo refuses the inertia of its
+            parts
     """
     length = float(np.ptp(vertices, axis=0).max())
     more = 10.0 ** round(-math.log10(length))

@@ -101,11 +101,12 @@ def standing_axis(up: Array, read_as: str) -> str | None:
 class Capture:
     """A clip and its interpretation.
 
-    clip      the motion; for a human, relative to a standing pose mapping   joint of the model ->
-    joint of the clip skeleton  of the human with the clip's bones; None in a scene without [human]
-    unit, up  m per length of the file, and its up axis rest      (n, 4) rotations of the joints in
-    the reference pose, relative to the zeros of the file;
-              None if the zeros are the reference
+    clip      the motion; for a human, relative to a standing pose
+    mapping   joint of the model -> joint of the clip
+    skeleton  of the human with the clip's bones; None in a scene without [human]
+    unit, up  m per length of the file, and its up axis
+    rest      (n, 4) rotations of the joints in the reference pose, relative to the zeros of the
+              file; None if the zeros are the reference
     posture   (3,) the person's mean direction from ankles to shoulders, z up; None without [human]
     lift      (frames,) height added to the root of the file, m, or None
     held      joints of the human that the file lacks
@@ -138,7 +139,8 @@ class Reading:
     skip     frames to drop at the start of the file
     mapping  joint of the model -> joint of the clip, in pairs
     floor    "soles" to put the soles of a person on the floor
-    mass     mass of a person, kg;  sex  for the proportions of a person
+    mass     of a person, kg
+    sex      for the proportions of a person
     """
 
     unit: float | None
