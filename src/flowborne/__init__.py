@@ -40,8 +40,7 @@ if TYPE_CHECKING:
     from flowborne.scenes.schema import Scene
     from flowborne.sim.running import RunInterrupted, RunResult, run
     from flowborne.sim.simulation import BlowUpError, Simulation, Snapshot
-    from flowborne.solids.model import SolidModel
-    from flowborne.solids.state import SolidState
+    from flowborne.solids.model import SolidModel, SolidState
     from flowborne.solids.tissue.growth import Tissue
     from flowborne.studies.batch_page import Batch, ClipRun
     from flowborne.studies.batches import run_clips
@@ -151,7 +150,7 @@ _PLACES = {
     "Simulation": "flowborne.sim.simulation",
     "Snapshot": "flowborne.sim.simulation",
     "SolidModel": "flowborne.solids.model",
-    "SolidState": "flowborne.solids.state",
+    "SolidState": "flowborne.solids.model",
     "StepReport": "flowborne.coupling.report",
     "StrengthInPhase": "flowborne.control.controller",
     "StudyResult": "flowborne.studies.result",

@@ -17,7 +17,7 @@ from flowborne.solids.flesh import Flesh
 from flowborne.solids.flesh_dynamics import assemble_flesh, static_forces
 from flowborne.solids.flesh_solve import prescribe_flesh
 from flowborne.solids.mjcf import read_spec
-from flowborne.solids.model import SolidModel
+from flowborne.solids.model import SolidModel, SolidState
 from flowborne.solids.momentum import (
     halfway_momentum,
     kinetic_energy,
@@ -25,7 +25,6 @@ from flowborne.solids.momentum import (
     momentum,
     potential_energy,
 )
-from flowborne.solids.state import SolidState
 from flowborne.solids.tissue.growth import Tissue, add_flesh
 from flowborne.solids.tissue.mesh import FleshMesh
 from flowborne.solids.tissue.mesh_file import mesh_bytes, read_mesh

@@ -12,7 +12,7 @@ import numpy as np
 
 from flowborne.kernels.arrays import Array, Integers, Mask
 from flowborne.solids.following import follow, outboard_dofs, rigidify
-from flowborne.solids.state import SolidState
+from flowborne.solids.model import SolidState
 from flowborne.solids.trajectories import JointCommand, Servo
 
 if TYPE_CHECKING:

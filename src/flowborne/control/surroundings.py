@@ -12,8 +12,7 @@ from flowborne.base.errors import SceneError
 from flowborne.base.phrases import suggestion
 from flowborne.control.python_function import with_parameters
 from flowborne.kernels.arrays import Integers
-from flowborne.solids.joint_kinds import joint_unit
-from flowborne.solids.model import SolidModel
+from flowborne.solids.model import SolidModel, joint_unit
 from flowborne.solids.trajectories import Trajectory
 
 

@@ -22,7 +22,7 @@ from flowborne.fluid.transport import parts_for
 from flowborne.solids.driven import Driven, drive
 from flowborne.solids.dynamics import kinematics
 from flowborne.solids.following import follow
-from flowborne.solids.state import SolidState
+from flowborne.solids.model import SolidState
 from flowborne.solids.trajectories import JointCommand
 
 

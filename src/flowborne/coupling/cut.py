@@ -24,8 +24,7 @@ from flowborne.fluid.grid import Array, Faces
 from flowborne.fluid.state import FluidState
 from flowborne.fluid.window import Window, moved_fluid
 from flowborne.solids.dynamics import Kinematics, kinematics
-from flowborne.solids.model import SolidModel
-from flowborne.solids.state import SolidState
+from flowborne.solids.model import SolidModel, SolidState
 
 
 def cut_by_bodies(world: World, pose: Kinematics | None = None) -> Geometry:

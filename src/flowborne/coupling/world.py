@@ -17,8 +17,7 @@ from flowborne.fluid.grid import Array, Grid
 from flowborne.fluid.state import FluidState, under
 from flowborne.fluid.wake import wake_shape
 from flowborne.fluid.window import Window, crosses
-from flowborne.solids.model import SolidModel
-from flowborne.solids.state import SolidState
+from flowborne.solids.model import SolidModel, SolidState
 from flowborne.solids.trajectories import NOTHING_TOLD, Told, Trajectory
 from flowborne.solids.wind import Wind
 

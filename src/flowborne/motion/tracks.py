@@ -1,4 +1,4 @@
-"""Prescribed motions of a joint as functions of time (`coupling.motion.Trajectory`)."""
+"""Prescribed motions of a joint as functions of time (`solids.trajectories.Trajectory`)."""
 
 from __future__ import annotations
 

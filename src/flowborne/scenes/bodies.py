@@ -19,22 +19,21 @@ from flowborne.scenes.holding import held
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.schema_bodies import SolidsTable
 from flowborne.solids import mjcf
-from flowborne.solids.compiler import MjModel, MjSpec, compiled_quietly
 from flowborne.solids.displacing import Displace
 from flowborne.solids.following import follow, posed_flesh
 from flowborne.solids.geoms import floors
-from flowborne.solids.joint_kinds import (
+from flowborne.solids.mjcf import Given, MjModel, MjSpec, compiled_quietly
+from flowborne.solids.model import (
     BALL,
     FREE,
     HINGE,
     JOINT_KINDS,
     SLIDE,
+    SolidModel,
+    SolidState,
     joint_kind,
     joint_unit,
 )
-from flowborne.solids.mjcf import Given
-from flowborne.solids.model import SolidModel
-from flowborne.solids.state import SolidState
 from flowborne.solids.trajectories import Trajectory
 
 

@@ -20,8 +20,7 @@ from flowborne.scenes.control import ControllerTable
 from flowborne.scenes.draft import Draft
 from flowborne.scenes.motions import out_of_plane
 from flowborne.scenes.schema import Scene
-from flowborne.solids.joint_kinds import FREE, joint_kind
-from flowborne.solids.model import SolidModel
+from flowborne.solids.model import FREE, SolidModel, joint_kind
 from flowborne.solids.trajectories import Trajectory
 
 

@@ -32,8 +32,7 @@ from flowborne.motion.tracks import (
     TrajectoryKeyframes,
     TrajectorySinusoid,
 )
-from flowborne.solids.joint_kinds import HINGE, JOINT_KINDS, SLIDE, joint_kind, joint_unit
-from flowborne.solids.model import SolidModel
+from flowborne.solids.model import HINGE, JOINT_KINDS, SLIDE, SolidModel, joint_kind, joint_unit
 from flowborne.solids.trajectories import ServoExact, ServoPD, Trajectory, driven
 
 Indices = NDArray[np.int64]
