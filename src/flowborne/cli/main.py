@@ -370,7 +370,7 @@ def film(
     files = RunFolder.existing(folder)
     check_drawing()
     from flowborne.base.progress import ProgressDisplay, RunProgress
-    from flowborne.scenes.scene_copy import film_settings
+    from flowborne.scenes.save import film_settings
     from flowborne.view.film import make_preview, write_shot
     from flowborne.view.shot import Shot
 

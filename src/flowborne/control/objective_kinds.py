@@ -29,10 +29,9 @@ from flowborne.base.tables import (
     triple,
 )
 from flowborne.control.measurement import Measurement
-from flowborne.control.objectives import OBJECTIVES, Objective, ObjectiveCallable
-from flowborne.control.phases import PhaseTable
-from flowborne.control.python_function import with_parameters
-from flowborne.control.surroundings import Surroundings
+from flowborne.control.objectives import OBJECTIVES, Objective, ObjectiveCallable, WeightedObjective
+from flowborne.control.phases import PhaseAlways, PhaseTable
+from flowborne.control.surroundings import Surroundings, with_parameters
 from flowborne.coupling.motion import Trajectory
 from flowborne.kernels.arrays import Array, Integers
 from flowborne.motion.tracks import Curve, TrajectoryConstant, TrajectoryKeyframes
@@ -70,6 +69,15 @@ class ObjectiveTable(Table):
     def build(self, around: Surroundings) -> Objective:
         """The objective; requires that `check` finds nothing."""
         raise NotImplementedError
+
+    def term(self, around: Surroundings) -> WeightedObjective:
+        """The objective with its weight, phases and joints."""
+        return WeightedObjective(
+            self.build(around),
+            self.weight if self.goal == "least" else -self.weight,
+            PhaseAlways() if self.phases is None else self.phases.build(around),
+            None if self.wanted_by is None else around.dofs(self.wanted_by),
+        )
 
 
 def unit(direction: Direction) -> Array:

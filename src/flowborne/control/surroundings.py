@@ -1,16 +1,19 @@
-"""The parts of a scene that its objectives, phases, rules and winds depend on."""
+"""The parts of a scene that its objectives, phases, rules and winds depend on, and the functions
+that a user wrote for them: "module:function" in a scene."""
 
 from __future__ import annotations
 
+import importlib
+import inspect
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from flowborne.base.errors import SceneError
+from flowborne.base.errors import PartError, SceneError
 from flowborne.base.phrases import suggestion
-from flowborne.control.python_function import with_parameters
 from flowborne.coupling.motion import Trajectory
 from flowborne.kernels.arrays import Integers
 from flowborne.solids.joint_kinds import joint_unit
@@ -102,3 +105,41 @@ def unknown_bodies(model: SolidModel, source: str, bodies: Iterable[str]) -> Ite
     for body in bodies:
         if body not in known:
             yield f"body '{body}' is not in {source}{suggestion(body, known, 'Its bodies are')}"
+
+
+def find_function(name: str) -> Callable[..., Any]:
+    """The function "module:function". Raises SceneError when Python does not find it."""
+    module, _, function = name.partition(":")
+    try:
+        with PartError.guarding(f"module '{module}'", ModuleNotFoundError):
+            imported = importlib.import_module(module)
+        found = getattr(imported, function)
+    except ModuleNotFoundError as error:
+        raise SceneError(
+            f"Python does not find module '{error.name}' of '{name}'. "
+            "Install it, put its folder on PYTHONPATH, or name its file in plugins."
+        ) from None
+    except AttributeError:
+        raise SceneError(
+            f"module '{module}' has no function '{function}'. Correct the name."
+        ) from None
+    except PartError as error:
+        raise SceneError(f"{error}.") from error
+    if not callable(found):
+        raise SceneError(f"'{name}' is {found!r} and no function. Correct the name.")
+    return found
+
+
+def with_parameters(name: str, parameters: Mapping[str, Any]) -> Callable[..., Any]:
+    """The function "module:function" with these parameters set.
+
+    raises  SceneError when there is no such function, or when it does not take one of them
+    """
+    function = find_function(name)
+    if not parameters:
+        return function
+    try:
+        inspect.signature(function).bind_partial(**parameters)
+    except (TypeError, ValueError) as error:
+        raise SceneError(f"function '{name}': {error}. Correct the parameters.") from None
+    return partial(function, **parameters)

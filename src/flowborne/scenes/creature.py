@@ -11,7 +11,7 @@ from flowborne.base.phrases import listed
 from flowborne.coupling.cut import cut_at
 from flowborne.coupling.world import Setup
 from flowborne.fluid.grid import Array
-from flowborne.scenes.bodies import displace_of, initial_state
+from flowborne.scenes.bodies import initial_state
 from flowborne.scenes.schema import Scene
 from flowborne.solids.dynamics import kinematics
 from flowborne.solids.geoms import solid_geoms
@@ -111,6 +111,6 @@ def creature_extent(scene: Scene, setup: Setup) -> Array:
 
 
 def _rule(scene: Scene) -> str:
-    if scene.solids is not None and not displace_of(scene.solids).by_rule:
+    if scene.solids is not None and not scene.solids.displace.build().by_rule:
         return "those of [solids] displace"
     return "of each body the visual ones, or the collision ones where those are open or small"

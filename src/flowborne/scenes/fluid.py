@@ -1,20 +1,25 @@
-"""The fluid of a scene: the checks of all that belongs to it, and its builder."""
+"""The fluid of a scene and the window in which it is simulated: checks and builders."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
+
+from flowborne.base.phrases import listed
 from flowborne.base.tables import triple
+from flowborne.coupling.window import following
 from flowborne.coupling.world import Fluid
 from flowborne.fluid.boundary import Boundaries
-from flowborne.fluid.grid import Grid
+from flowborne.fluid.grid import Array, Grid
+from flowborne.fluid.window import crosses
 from flowborne.motion.inflow import Bands, DyeBandsValue
-from flowborne.scenes.domain import check_memory
+from flowborne.scenes.domain import Domain, check_memory
 from flowborne.scenes.draft import Draft, Key
 from flowborne.scenes.dye import DyeBands, DyeBox, check_bands, check_boxes
 from flowborne.scenes.schema import Scene
-from flowborne.scenes.sides import DyeValue, check_outlet, check_sides
-from flowborne.scenes.window import check_window
+from flowborne.scenes.sides import DyeValue, InflowSide, check_outlet, check_sides
+from flowborne.solids.model import SolidModel
 
 NEEDS_DOMAIN = ("fluid", "boundaries", "sources", "mouths", "dye")
 
@@ -53,6 +58,16 @@ def _entering(side: str, scene: Scene, grid: Grid) -> dict[str, DyeValue]:
         if isinstance(dye, DyeBands) and dye.side == side:
             groups[dye.name] = (*groups.get(dye.name, ()), dye.build(grid))
     return {name: DyeBandsValue(bands) for name, bands in groups.items()}
+
+
+def with_window(fluid: Fluid | None, scene: Scene, model: SolidModel, q: Array) -> Fluid | None:
+    """The fluid whose grid follows what the scene names, from the positions q (nq,) on."""
+    domain = scene.domain
+    if fluid is None or domain is None or not domain.follows:
+        return fluid
+    named = domain.follow != "bodies"
+    bodies = [model.body(domain.follow)] if named else np.flatnonzero(model.moving).tolist()
+    return following(fluid, model, q, bodies, domain.axes)
 
 
 def check_dimensions(draft: Draft) -> Iterator[str]:
@@ -116,7 +131,7 @@ def check_fluid(draft: Draft) -> Iterator[str]:
     if len(scene.domain.lower) != scene.dimensions:
         return
     yield from check_memory(draft, scene.domain)
-    yield from check_window(draft)
+    yield from _check_window(draft, scene.domain)
     if scene.boundaries is not None and draft.sound("boundaries"):
         yield from check_sides(draft, scene.boundaries, slab=scene.is_slab)
         free = any(side.boundary.free for _, side in scene.boundaries)
@@ -135,3 +150,59 @@ def check_fluid(draft: Draft) -> Iterator[str]:
             f"{draft.at('film', 'field')}: there is no dye to show. Add [[dye]], or show "
             "vorticity, speed or pressure."
         )
+
+
+def _check_window(draft: Draft, domain: Domain) -> Iterator[str]:
+    """There must be fluid beyond the sides across which the domain moves."""
+    scene, axes = draft.scene, domain.axes
+    if not domain.follows:
+        if domain.along is not None:
+            yield (
+                f"{draft.at('domain', 'along')}: the domain follows nothing. "
+                "Give follow, or drop this key."
+            )
+        return
+    if not scene.has_bodies:
+        yield (
+            f"{draft.at('domain', 'follow')}: there are no bodies. "
+            "Add [solids] with a model, or drop this key."
+        )
+    if scene.is_slab and 2 in axes:
+        yield (
+            f"{draft.at('domain', 'along')}: a scene of 2 dimensions has no z. Give x, y or both."
+        )
+        return
+    if scene.boundaries is None or not draft.sound("boundaries"):
+        return
+    for name, side in scene.boundaries:
+        kind, normal = side.boundary, "xyz".index(name[0])
+        across = ["xyz"[axis] for axis in axes if axis != normal]
+        if normal in axes and not crosses(kind):
+            others = ", ".join(f'"{axis}"' for axis in across)
+            yield (
+                f"{draft.at('boundaries', name)}: the domain follows bodies along {name[0]}, and "
+                f"beyond a {kind.kind} side there is no fluid. Make the side far, open or inflow"
+                + (f", or give [domain] along = [{others}]." if others else ".")
+            )
+        if isinstance(side, InflowSide) and side.profile == "parabolic" and across:
+            yield (
+                f"{draft.at('boundaries', name)}: its profile is 0 at the edges of the side, which "
+                f"move along {listed(across)} with the domain. Give profile = "
+                f'"uniform", or [domain] along = ["{name[0]}"].'
+            )
+
+
+def check_followed(draft: Draft, model: SolidModel) -> Iterator[str]:
+    """What the domain follows must be a body that can move."""
+    domain = draft.scene.domain
+    if domain is None or not domain.follows:
+        return
+    name, where = domain.follow, draft.at("domain", "follow")
+    if name == "bodies":
+        if not model.moving.any():
+            yield f"{where}: no body of the model moves. Drop this key."
+        return
+    unknown = draft.unknown_body(model, name, "domain", "follow")
+    yield from unknown
+    if not unknown and not model.moving[model.body(name)]:
+        yield f"{where}: body '{name}' does not move. Name one that does, or give \"bodies\"."

@@ -15,8 +15,7 @@ from flowborne.coupling.world import Setup
 from flowborne.fluid.grid import Array
 from flowborne.fluid.transport import EXTRAPOLATION_COURANT
 from flowborne.motion.tracks import SPEED_SAMPLES
-from flowborne.scenes.bodies import initial_state
-from flowborne.scenes.holding import driven_dofs
+from flowborne.scenes.bodies import driven_dofs, initial_state
 from flowborne.scenes.schema import Scene
 from flowborne.solids.joint_kinds import joint_unit
 from flowborne.solids.surfaces import Outline

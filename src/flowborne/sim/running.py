@@ -31,7 +31,7 @@ from flowborne.runs.summary import doubts_of, peak_memory, summarise, versions
 from flowborne.scenes.creature import creature_of
 from flowborne.scenes.earlier import earlier_joints
 from flowborne.scenes.notes import notes_of
-from flowborne.scenes.scene_copy import scene_to_resume, with_frames, write_scene
+from flowborne.scenes.save import scene_to_resume, with_frames, write_scene
 from flowborne.scenes.seen import seen_bodies
 from flowborne.scenes.warn import warnings_of
 from flowborne.sim.simulation import BlowUpError, Simulation, Snapshot
