@@ -37,8 +37,8 @@ class Mapper(Protocol):
         ...
 
     def close(self) -> None:
-        """Stop the workers; a later `map` starts new ones."""
-        ...
+        """Stop the workers, if it has any; a later `map` starts new ones."""
+        return
 
 
 def collect(futures: list[Any]) -> list[Any]:
@@ -51,14 +51,11 @@ def collect(futures: list[Any]) -> list[Any]:
         raise
 
 
-class Serial:
+class Serial(Mapper):
     """One evaluation after the other, in the calling thread."""
 
     def map(self, function: Callable[[Task], Answer], tasks: Sequence[Task]) -> list[Answer]:
         return [function(task) for task in tasks]
-
-    def close(self) -> None:
-        """There are no workers to stop."""
 
 
 class Pool:
@@ -74,11 +71,8 @@ class Pool:
             raise ValueError(f"number of workers is {workers}: give at least 1")
         self._executor: Executor | None = None
 
-    def __getstate__(self) -> dict[str, Any]:
-        return {"workers": self.workers}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__init__(state["workers"])  # type: ignore[misc]
+    def __reduce__(self) -> tuple[type[Pool], tuple[int]]:
+        return type(self), (self.workers,)
 
     def share(self, tasks: int) -> int:
         """Number of threads for the kernels of each of some tasks."""
@@ -138,7 +132,7 @@ class Processes(Pool):
         return list(chain.from_iterable(answers))
 
 
-class Foreign:
+class Foreign(Mapper):
     """Any object with `submit` (giving futures with `result`) or else an ordered `map`.
 
     For example an executor of `concurrent.futures` or mpi4py, or a client of `dask.distributed`;
@@ -159,9 +153,6 @@ class Foreign:
         if hasattr(self.executor, "submit"):
             return collect([self.executor.submit(function, task) for task in tasks])
         return list(self.executor.map(function, tasks))
-
-    def close(self) -> None:
-        """The owner of the executor closes it."""
 
 
 def mapper(executor: str | object = "threads", workers: int | None = None) -> Mapper:

@@ -300,12 +300,8 @@ class ObjectiveInputMotionTable(ObjectiveTable):
     @model_validator(mode="after")
     def _check(self) -> Self:
         if self.times is not None or self.values is not None:
-            check_keyframes(self.keyframe_times(), self.values, "values", least=1)
+            check_keyframes(self.times or (0.0,), self.values, "values", least=1)
         return self
-
-    def keyframe_times(self) -> tuple[float, ...]:
-        """s; 0 for a fixed pose."""
-        return (0.0,) if self.times is None else self.times
 
     @property
     def rests(self) -> bool:
@@ -340,7 +336,7 @@ class ObjectiveInputMotionTable(ObjectiveTable):
         values = tuple(unit * value for value in self.values)
         if len(values) == 1:
             return TrajectoryConstant(dofs, values[0])
-        return TrajectoryKeyframes(dofs, Curve(self.keyframe_times(), values))
+        return TrajectoryKeyframes(dofs, Curve(self.times or (0.0,), values))
 
     def build(self, around: Surroundings) -> ObjectiveInputMotion:
         return ObjectiveInputMotion(around.dofs([self.joint]), self.reference(around))

@@ -107,13 +107,16 @@ def unknown_bodies(model: SolidModel, source: str, bodies: Iterable[str]) -> Ite
             yield f"body '{body}' is not in {source}{suggestion(body, known, 'Its bodies are')}"
 
 
-def find_function(name: str) -> Callable[..., Any]:
-    """The function "module:function". Raises SceneError when Python does not find it."""
-    module, _, function = name.partition(":")
+def with_parameters(name: str, parameters: Mapping[str, Any]) -> Callable[..., Any]:
+    """The function "module:function" with these parameters set.
+
+    raises  SceneError when Python does not find it, or when it does not take one of them
+    """
+    module, _, attribute = name.partition(":")
     try:
         with PartError.guarding(f"module '{module}'", ModuleNotFoundError):
             imported = importlib.import_module(module)
-        found = getattr(imported, function)
+        function = getattr(imported, attribute)
     except ModuleNotFoundError as error:
         raise SceneError(
             f"Python does not find module '{error.name}' of '{name}'. "
@@ -121,21 +124,12 @@ def find_function(name: str) -> Callable[..., Any]:
         ) from None
     except AttributeError:
         raise SceneError(
-            f"module '{module}' has no function '{function}'. Correct the name."
+            f"module '{module}' has no function '{attribute}'. Correct the name."
         ) from None
     except PartError as error:
         raise SceneError(f"{error}.") from error
-    if not callable(found):
-        raise SceneError(f"'{name}' is {found!r} and no function. Correct the name.")
-    return found
-
-
-def with_parameters(name: str, parameters: Mapping[str, Any]) -> Callable[..., Any]:
-    """The function "module:function" with these parameters set.
-
-    raises  SceneError when there is no such function, or when it does not take one of them
-    """
-    function = find_function(name)
+    if not callable(function):
+        raise SceneError(f"'{name}' is {function!r} and no function. Correct the name.")
     if not parameters:
         return function
     try:

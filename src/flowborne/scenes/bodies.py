@@ -37,13 +37,20 @@ from flowborne.solids.mjcf import Given
 from flowborne.solids.model import SolidModel
 from flowborne.solids.state import SolidState
 
+MODEL = "gravity", "dimensions", "plugins", "solids", "shapes", "flesh", "human", "clip", "earlier"
+"""Keys of a scene on which its model depends."""
+
 
 def load_model(scene: Scene) -> SolidModel:
     """The model of a scene, its human or its file: made once for a scene as it was loaded.
 
     raises  SceneError when a file is missing or MuJoCo refuses it
     """
-    return scene.kept.get(scene, _loaded)
+    parts = scene.folder, *(getattr(scene, key) for key in MODEL)
+    if scene.kept.get("parts") != parts:
+        scene.kept.update(parts=parts, model=_loaded(scene))
+    model: SolidModel = scene.kept["model"]
+    return model
 
 
 def _loaded(scene: Scene) -> SolidModel:
@@ -197,7 +204,7 @@ def check_initial(draft: Draft, model: SolidModel) -> Iterator[str]:
     for key, values in (("positions", initial.positions), ("velocities", initial.velocities)):
         for joint, numbers in values.items():
             where = draft.at("initial", key)
-            unknown = draft.unknown_joint(model, joint, "initial", key)
+            unknown = draft.unknown_joints(model, [joint], "initial", key)
             yield from unknown
             if unknown:
                 continue

@@ -17,7 +17,7 @@ from flowborne.motion.human.gait import gait_clip
 from flowborne.motion.human.skeleton import SIDES, standard_skeleton
 from flowborne.scenes.earlier import earlier_joints
 from flowborne.scenes.schema import Scene
-from flowborne.scenes.schema_bodies import ClipTable, HumanTable
+from flowborne.scenes.schema_bodies import HumanTable
 from flowborne.solids.model import SolidModel
 
 
@@ -34,26 +34,21 @@ def capture_of(scene: Scene) -> Capture | None:
         assert scene.human is not None
         found = _walk(scene.human.height)
     else:
-        found = read_clip(
-            scene.folder / table.file, _reading(scene, table), person=scene.human is not None
+        human = scene.human or HumanTable()
+        reading = Reading(
+            None if table.unit == "auto" else table.unit,
+            None if table.up == "auto" else table.up,
+            table.skip,
+            tuple(table.mapping.items()),
+            table.floor,
+            human.mass,
+            human.sex,
         )
+        found = read_clip(scene.folder / table.file, reading, person=scene.human is not None)
         named = _words(scene) if found.held else set()
         if still := tuple(joint for joint in found.held if joint in named):
             found = with_held_joints(found, still)
     return replace(found, clip=found.clip.placed(offset, heading))
-
-
-def _reading(scene: Scene, table: ClipTable) -> Reading:
-    human = scene.human or HumanTable()
-    return Reading(
-        None if table.unit == "auto" else table.unit,
-        None if table.up == "auto" else table.up,
-        table.skip,
-        tuple(table.mapping.items()),
-        table.floor,
-        human.mass,
-        human.sex,
-    )
 
 
 def _words(scene: Scene) -> set[object]:

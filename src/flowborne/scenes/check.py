@@ -6,7 +6,6 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from flowborne.base.errors import SceneError
 from flowborne.control.surroundings import Surroundings
 from flowborne.coupling.world import Setup
 from flowborne.motion.clip import Clip
@@ -15,12 +14,12 @@ from flowborne.scenes.build import mouths_of, surroundings_of
 from flowborne.scenes.capture import capture_of, clip_motion
 from flowborne.scenes.control import check_control
 from flowborne.scenes.draft import Draft
-from flowborne.scenes.earlier import check_earlier, check_earlier_joints, earlier_joints
+from flowborne.scenes.earlier import check_earlier_joints, earlier_joints, earlier_of
 from flowborne.scenes.flesh import check_flesh, check_flesh_places
 from flowborne.scenes.fluid import check_dimensions, check_fluid, check_followed, fluid_of
 from flowborne.scenes.motions import MotionFormulaTable, check_formulas, check_motions
 from flowborne.scenes.mouths import check_mouth_cells, check_mouths
-from flowborne.scenes.schema_bodies import ClipTable
+from flowborne.scenes.schema_bodies import ClipTable, SolidsTable
 from flowborne.solids.joint_kinds import FREE, HINGE, SLIDE, joint_kind, joint_unit
 from flowborne.solids.model import SolidModel
 from flowborne.solids.surfaces import geom_boxes
@@ -44,33 +43,29 @@ def cross_check(draft: Draft) -> list[str]:
     problems = [*check_dimensions(draft), *check_fluid(draft), *check_without_bodies(draft)]
     has_model = scene.solids is not None
     flesh = check_flesh(draft, scene.flesh, slab=scene.is_slab, has_model=has_model)
-    unusable = [*check_earlier(draft), *check_clip(draft), *flesh]
+    earlier = draft.failing(lambda: earlier_of(scene), "earlier")
+    unusable = [*earlier, *check_clip(draft), *flesh]
     problems += unusable
     readable = draft.sound("dimensions", "gravity", "clip", "shapes")
     if unusable or not (readable and scene.has_bodies):
         return problems
-    try:
-        model = load_model(scene)
-    except SceneError as error:
-        table = "human" if scene.human is not None else "flesh" if scene.flesh else "solids"
-        return problems + [f"{draft.at(table)}: {problem}" for problem in error.problems]
+    table = "human" if scene.human is not None else "flesh" if scene.flesh else "solids"
+    if unusable := draft.failing(lambda: load_model(scene), table):
+        return problems + unusable
+    model = load_model(scene)
     lost = [*check_earlier_joints(draft, model), *check_followers(draft, model)]
     if lost:
         return problems + lost
     around = surroundings_of(scene, model, draft.broken)
     coupling = scene.fluid.coupling if scene.fluid is not None else "two-way"
     mouths = check_mouths(draft, scene.mouths, coupling, around)
-    problems += [*check_bodies(draft, around), *mouths, *_check_control(draft, around)]
+    tables = scene.control, scene.objectives, scene.controller
+    control = check_control(draft, *tables, scene.frame_time, around)
+    problems += [*check_bodies(draft, around), *mouths, *control]
     if problems or not scene.mouths or draft.broken:
         return problems
     setup, start = Setup(model, fluid_of(scene)), initial_state(scene, model)
     return list(check_mouth_cells(draft, mouths_of(scene, model), setup, start))
-
-
-def _check_control(draft: Draft, around: Surroundings) -> Iterator[str]:
-    scene = draft.scene
-    tables = scene.control, scene.objectives, scene.controller
-    return check_control(draft, *tables, scene.frame_time, around)
 
 
 NEEDS_BODIES = (
@@ -117,17 +112,14 @@ def check_bodies(draft: Draft, around: Surroundings) -> Iterator[str]:
             f"{draft.at('shapes')}: they are on bodies of a model file. "
             "Add [solids] with a model, or drop [[shapes]]."
         )
-    named = []
-    for body in () if scene.solids is None else scene.solids.densities:
-        named += draft.unknown_body(model, body, "solids", "densities")
-    named += _unheld(draft, model)
-    for body in scene.output.bodies:
-        named += draft.unknown_body(model, body, "output", "bodies")
-    joints = scene.output.joints
-    for joint in () if isinstance(joints, bool) else joints:
-        named += draft.unknown_joint(model, joint, "output", "joints")
-    if scene.film.camera.follow not in ("bodies", "nothing"):
-        named += draft.unknown_body(model, scene.film.camera.follow, "film", "camera", "follow")
+    named, output, followed = [], scene.output, {scene.film.camera.follow} - {"bodies", "nothing"}
+    if scene.solids is not None:
+        named += draft.unknown_bodies(model, scene.solids.densities, "solids", "densities")
+        named += _unheld(draft, scene.solids, model)
+    named += draft.unknown_bodies(model, output.bodies, "output", "bodies")
+    if not isinstance(output.joints, bool):
+        named += draft.unknown_joints(model, output.joints, "output", "joints")
+    named += draft.unknown_bodies(model, followed, "film", "camera", "follow")
     named += check_followed(draft, model)
     for index, wind in enumerate(scene.wind):
         named += [f"{draft.at('wind', index)}: {problem}" for problem in wind.check(around)]
@@ -145,15 +137,14 @@ def check_bodies(draft: Draft, around: Surroundings) -> Iterator[str]:
         yield from _check_places(draft, model)
 
 
-def _unheld(draft: Draft, model: SolidModel) -> list[str]:
+def _unheld(draft: Draft, solids: SolidsTable, model: SolidModel) -> list[str]:
     """Joints of [solids] hold that cannot be held."""
-    scene = draft.scene
-    hold = () if scene.solids is None or scene.solids.hold is True else scene.solids.hold or ()
+    scene, hold = draft.scene, () if isinstance(solids.hold, bool) else solids.hold
     where, problems = draft.at("solids", "hold"), []
     moved = {table.joint: "a [[motion]]" for table in scene.motion}
     moved |= dict.fromkeys(scene.controlled_joints(), "[[control]]")
     for joint in hold:
-        unknown = draft.unknown_joint(model, joint, "solids", "hold")
+        unknown = draft.unknown_joints(model, [joint], "solids", "hold")
         problems += unknown
         if not unknown and joint_kind(model, joint) == FREE:
             problems.append(f"{where}: '{joint}' is a free joint, by which a body floats. Drop it.")
@@ -219,14 +210,12 @@ def _check_places(draft: Draft, model: SolidModel) -> Iterator[str]:
 
 def _formulas(draft: Draft) -> dict[str, str]:
     """Where each formula is, for a message -> its text."""
-    found = {}
-    for index, motion in enumerate(draft.scene.motion):
-        if isinstance(motion, MotionFormulaTable):
-            found[draft.at("motion", index, "position")] = motion.position
-    for index, mouth in enumerate(draft.scene.mouths):
-        if mouth.factor is not None:
-            found[draft.at("mouths", index, "factor")] = mouth.factor
-    return found
+    motions, mouths = enumerate(draft.scene.motion), enumerate(draft.scene.mouths)
+    positions = [(n, m.position) for n, m in motions if isinstance(m, MotionFormulaTable)]
+    factors = [(n, mouth.factor) for n, mouth in mouths if mouth.factor is not None]
+    return {draft.at("motion", n, "position"): text for n, text in positions} | {
+        draft.at("mouths", n, "factor"): text for n, text in factors
+    }
 
 
 def check_clip(draft: Draft) -> Iterator[str]:
@@ -245,12 +234,9 @@ def check_clip(draft: Draft) -> Iterator[str]:
                 "Add clip.file or [human]."
             )
         return
-    try:
-        capture = capture_of(scene)
-    except SceneError as error:
-        yield from (f"{draft.at('clip')}: {problem}" for problem in error.problems)
-        return
-    if capture is not None and scene.clip.file is not None:
+    unusable = draft.failing(lambda: capture_of(scene), "clip")
+    yield from unusable
+    if not unusable and scene.clip.file is not None and (capture := capture_of(scene)):
         yield from _check_first_pose(draft, capture.clip, scene.clip)
 
 
@@ -281,11 +267,10 @@ def check_followers(draft: Draft, model: SolidModel) -> Iterator[str]:
     assert capture is not None
     others = scene.moved_joints() | dict.fromkeys(scene.clip.free, "free")
     others |= dict.fromkeys(earlier_joints(scene), "moved by the [earlier] run")
-    found = False
-    for joint in (*scene.clip.mapping, *(scene.clip.joints or ()), *scene.clip.free):
-        unknown = draft.unknown_joint(model, joint, "clip")
-        yield from unknown
-        found |= bool(unknown)
+    named = (*scene.clip.mapping, *(scene.clip.joints or ()), *scene.clip.free)
+    unknown = draft.unknown_joints(model, named, "clip")
+    yield from unknown
+    found = bool(unknown)
     for joint in scene.clip.joints or ():
         if joint in others:
             yield (
@@ -306,7 +291,4 @@ def check_followers(draft: Draft, model: SolidModel) -> Iterator[str]:
         found = True
     if found or any(check_initial(draft, model)):
         return
-    try:
-        clip_motion(scene, model, posed(scene, model).q)
-    except SceneError as error:
-        yield from (f"{draft.at('clip')}: {problem}" for problem in error.problems)
+    yield from draft.failing(lambda: clip_motion(scene, model, posed(scene, model).q), "clip")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from flowborne.fluid.window import crosses
 from flowborne.motion.inflow import Bands, DyeBandsValue
 from flowborne.scenes.domain import Domain, check_memory
 from flowborne.scenes.draft import Draft, Key
-from flowborne.scenes.dye import DyeBands, DyeBox, check_bands, check_boxes
+from flowborne.scenes.dye import BoxTable, DyeBands, DyeBox, check_bands
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.sides import DyeValue, InflowSide, check_outlet, check_sides
 from flowborne.solids.model import SolidModel
@@ -92,23 +93,14 @@ def check_dimensions(draft: Draft) -> Iterator[str]:
 def _vectors(draft: Draft) -> Iterator[tuple[tuple[Key, ...], tuple[float, ...]]]:
     scene = draft.scene
     yield ("gravity",), scene.gravity
-    if scene.fluid is not None:
-        yield ("fluid", "velocity"), scene.fluid.velocity
-        yield ("fluid", "body_force"), scene.fluid.body_force
-    if scene.boundaries is not None:
-        for name, side in scene.boundaries:
-            if hasattr(side, "velocity"):
-                yield ("boundaries", name, "velocity"), side.velocity
-    for index, source in enumerate(scene.sources):
-        if source.velocity is not None:
-            yield ("sources", index, "velocity"), source.velocity
-    for index, mouth in enumerate(scene.mouths):
-        yield ("mouths", index, "position"), mouth.position
-        yield ("mouths", index, "direction"), mouth.direction
-    for index, wind in enumerate(scene.wind):
-        for key in ("velocity", "force"):
-            if hasattr(wind, key):
-                yield ("wind", index, key), getattr(wind, key)
+    tables: list[tuple[tuple[Key, ...], Any]] = [(("fluid",), scene.fluid)]
+    tables += [(("boundaries", name), side) for name, side in scene.boundaries or ()]
+    for key in ("sources", "mouths", "wind"):
+        tables += [((key, index), table) for index, table in enumerate(getattr(scene, key))]
+    for keys, table in tables:
+        for key in ("velocity", "body_force", "position", "direction", "force"):
+            if (vector := getattr(table, key, None)) is not None:
+                yield (*keys, key), vector
 
 
 def check_fluid(draft: Draft) -> Iterator[str]:
@@ -144,7 +136,11 @@ def check_fluid(draft: Draft) -> Iterator[str]:
         if draft.sound("sources"):
             yield from check_outlet(draft, scene.boundaries, scene.domain, rates)
         yield from check_bands(draft, scene.dye, scene.boundaries, scene.domain)
-    yield from check_boxes(draft, scene.sources, scene.dye, scene.domain)
+    for key, tables in (("sources", scene.sources), ("dye", scene.dye)):
+        for index, box in enumerate(tables):
+            if isinstance(box, BoxTable):
+                for problem in box.check(scene.domain):
+                    yield f"{draft.at(key, index)}: {problem}"
     if scene.film.field == "dye" and not scene.scalars() and draft.sound("film", "dye", "mouths"):
         yield (
             f"{draft.at('film', 'field')}: there is no dye to show. Add [[dye]], or show "
@@ -202,7 +198,7 @@ def check_followed(draft: Draft, model: SolidModel) -> Iterator[str]:
         if not model.moving.any():
             yield f"{where}: no body of the model moves. Drop this key."
         return
-    unknown = draft.unknown_body(model, name, "domain", "follow")
+    unknown = draft.unknown_bodies(model, [name], "domain", "follow")
     yield from unknown
     if not unknown and not model.moving[model.body(name)]:
         yield f"{where}: body '{name}' does not move. Name one that does, or give \"bodies\"."

@@ -35,17 +35,13 @@ def join_elbows(raw: dict[str, Any]) -> None:
     human = raw.get("human")
     if not (isinstance(human, dict) and human.get("elbows") is True):
         return
-    for table, keys in (("control", ("joints",)), ("objectives", ("joints", "wanted_by"))):
-        entries = raw.get(table)
+    for entries in (raw.get("control"), raw.get("objectives")):
         for entry in entries if isinstance(entries, list) else []:
-            for key in keys:
-                if isinstance(entry, dict) and isinstance(entry.get(key), list):
-                    entry[key] = _joined(entry[key])
-
-
-def _joined(joints: list[Any]) -> list[Any]:
-    added = [f"{s}_elbow" for s in SIDES if f"{s}_shoulder" in joints]
-    return [*joints, *(elbow for elbow in added if elbow not in joints)]
+            for key in ("joints", "wanted_by"):
+                joints = entry.get(key) if isinstance(entry, dict) else None
+                if isinstance(joints, list):
+                    added = [f"{side}_elbow" for side in SIDES if f"{side}_shoulder" in joints]
+                    joints += [elbow for elbow in added if elbow not in joints]
 
 
 BUILT_IN = (

@@ -4,7 +4,7 @@ scene in a run folder: written, read to resume the run, and its table [film]."""
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from itertools import chain, count
 from pathlib import Path
 from typing import Any
@@ -66,7 +66,12 @@ def scene_files(scene: Scene) -> dict[str, bytes]:
     if scene.model_path is not None:
         assert scene.solids is not None
         name = named(scene.model_path.name)
-        files |= _model_files(scene.model_path, name, packages_of(scene))
+        try:
+            found = gathered(scene.model_path, packages_of(scene))
+        except OSError as error:
+            raise _unreadable(Path(error.filename), error) from None
+        texts = {name if one == found.name else one: text for one, text in found.texts.items()}
+        files |= texts | found.assets
         changed["solids"] = scene.solids.model_copy(update={"model": name, "packages": ()})
     for name, plugin in zip(changed["plugins"], scene.plugins, strict=True):
         files[name] = _read(scene.folder / plugin)
@@ -109,16 +114,6 @@ def _flesh_files(scene: Scene, named: Named) -> tuple[tuple[FleshTable, ...], di
             files[changed["surface"]] = _read(scene.folder / table.surface)
         tables.append(table.model_copy(update=changed))
     return tuple(tables), files
-
-
-def _model_files(model: Path, name: str, packages: Sequence[Path]) -> dict[str, bytes]:
-    """The model, under `name`, and what MuJoCo reads for it."""
-    try:
-        found = gathered(model, packages)
-    except OSError as error:
-        raise _unreadable(Path(error.filename), error) from None
-    texts = {name if one == found.name else one: found.texts[one] for one in found.texts}
-    return texts | found.assets
 
 
 def _read(path: Path) -> bytes:
@@ -167,9 +162,11 @@ def scene_to_resume(folder: RunFolder, wanted: Scene) -> Scene:
     if ours == theirs:
         return saved
     name = folder.scene.name
+    before, after = (_flat(tomllib.loads(files[name].decode())) for files in (ours, theirs))
     differing = [
-        f"{key} is {before} there and {after} here"
-        for key, before, after in _differences(_flat(ours[name]), _flat(theirs[name]))
+        f"{key} is {before.get(key, 'absent')} there and {after.get(key, 'absent')} here"
+        for key in before | after
+        if before.get(key, "absent") != after.get(key, "absent")
     ] or [f"the file {other} differs" for other in sorted(ours) if ours[other] != theirs.get(other)]
     raise RunFolderError(
         f"{folder.path} holds a run of another scene ({'; '.join(differing[:3])}); "
@@ -178,28 +175,15 @@ def scene_to_resume(folder: RunFolder, wanted: Scene) -> Scene:
     )
 
 
-def _flat(toml: bytes) -> dict[str, Any]:
-    """ "fluid.density"-like keys of a file and their values."""
+def _flat(value: Any, key: str = "") -> dict[str, Any]:
+    """ "fluid.density"-like keys of tables and their values."""
+    listed = isinstance(value, list) and value and isinstance(value[0], dict)
+    if not (listed or isinstance(value, dict)):
+        return {key: value}
     flat: dict[str, Any] = {}
-
-    def walk(key: str, value: Any) -> None:
-        parts: dict[Any, Any] | None = value if isinstance(value, dict) else None
-        if isinstance(value, list) and value and isinstance(value[0], dict):
-            parts = dict(enumerate(value))
-        if parts is None:
-            flat[key] = value
-            return
-        for name, part in parts.items():
-            walk(f"{key}.{name}" if key else str(name), part)
-
-    walk("", tomllib.loads(toml.decode()))
+    for name, part in enumerate(value) if listed else value.items():
+        flat |= _flat(part, f"{key}.{name}" if key else str(name))
     return flat
-
-
-def _differences(ours: dict[str, Any], theirs: dict[str, Any]) -> list[tuple[str, Any, Any]]:
-    """(key, ours, theirs) for each difference; "absent" if one has no such key."""
-    rows = [(key, ours.get(key, "absent"), theirs.get(key, "absent")) for key in ours | theirs]
-    return [row for row in rows if row[1] != row[2]]
 
 
 def film_settings(folder: RunFolder, overrides: Mapping[str, str]) -> dict[str, Any]:
