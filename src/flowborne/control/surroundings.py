@@ -59,11 +59,20 @@ class Surroundings:
 
     def unknown_joints(self, joints: Iterable[str]) -> Iterator[str]:
         """A complaint for each joint that the model lacks."""
-        return unknown_joints(self.model, self.source, joints)
+        carried = zip(self.model.joint_names, self.model.mj.jnt_bodyid, strict=True)
+        bones = [name for name, body in carried if body < self.model.nbody]  # others are of flesh
+        for joint in joints:
+            if joint not in bones:
+                end = suggestion(joint, bones, "Its joints are")
+                yield f"joint '{joint}' is not in {self.source}{end}"
 
     def unknown_bodies(self, bodies: Iterable[str]) -> Iterator[str]:
         """A complaint for each body that the model lacks."""
-        return unknown_bodies(self.model, self.source, bodies)
+        known = self.model.body_names
+        for body in bodies:
+            if body not in known:
+                end = suggestion(body, known, "Its bodies are")
+                yield f"body '{body}' is not in {self.source}{end}"
 
     def unusable_function(self, name: str, parameters: Mapping[str, Any]) -> Iterator[str]:
         """A complaint where a function "module:function" is not found, or refuses a parameter."""
@@ -88,23 +97,6 @@ class Surroundings:
     def unit(self, joint: str) -> float:
         """SI value of one unit of the joint's position in a scene."""
         return joint_unit(self.model, joint)
-
-
-def unknown_joints(model: SolidModel, source: str, joints: Iterable[str]) -> Iterator[str]:
-    """A complaint for each joint that a model lacks; `source` names the model."""
-    carried = zip(model.joint_names, model.mj.jnt_bodyid, strict=True)
-    bones = [name for name, body in carried if body < model.nbody]  # the others are of flesh
-    for joint in joints:
-        if joint not in bones:
-            yield f"joint '{joint}' is not in {source}{suggestion(joint, bones, 'Its joints are')}"
-
-
-def unknown_bodies(model: SolidModel, source: str, bodies: Iterable[str]) -> Iterator[str]:
-    """A complaint for each body that a model lacks; `source` names the model."""
-    known = model.body_names
-    for body in bodies:
-        if body not in known:
-            yield f"body '{body}' is not in {source}{suggestion(body, known, 'Its bodies are')}"
 
 
 def with_parameters(name: str, parameters: Mapping[str, Any]) -> Callable[..., Any]:

@@ -11,6 +11,7 @@ import numpy as np
 
 from flowborne.base.errors import SceneError
 from flowborne.base.phrases import suggestion
+from flowborne.control.surroundings import Surroundings
 from flowborne.coupling.motion import Trajectory
 from flowborne.coupling.servo import Servo, ServoExact, ServoPD, driven
 from flowborne.kernels.arrays import Array, Integers, Mask
@@ -176,9 +177,9 @@ def initial_state(scene: Scene, model: SolidModel) -> SolidState:
     return state
 
 
-def check_initial(draft: Draft, model: SolidModel) -> Iterator[str]:
+def check_initial(draft: Draft, around: Surroundings) -> Iterator[str]:
     """Problems of [initial] with the model's keyframes and joints."""
-    initial = draft.scene.initial
+    initial, model = draft.scene.initial, around.model
     if initial.keyframe is not None:
         own, where = keyframes(draft.scene, model), draft.at("initial", "keyframe")
         keys = [own.key(n).name for n in range(own.nkey)]
@@ -204,7 +205,7 @@ def check_initial(draft: Draft, model: SolidModel) -> Iterator[str]:
     for key, values in (("positions", initial.positions), ("velocities", initial.velocities)):
         for joint, numbers in values.items():
             where = draft.at("initial", key)
-            unknown = draft.unknown_joints(model, [joint], "initial", key)
+            unknown = draft.said(around.unknown_joints([joint]), "initial", key)
             yield from unknown
             if unknown:
                 continue

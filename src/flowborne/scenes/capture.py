@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 
@@ -131,30 +131,15 @@ def clip_motion(
         blend=table.blend,
         smooth=table.smooth,
     )
-    if passage.blend > 0.0:
-        start = _where_it_begins(scene, model, start, capture, passage, chosen)
-    return trajectory_of_clip(
-        model, capture.clip, capture.mapping, passage, joints=chosen, initial=start
-    )
-
-
-def _where_it_begins(
-    scene: Scene,
-    model: SolidModel,
-    start: Array,
-    capture: Capture,
-    passage: Passage,
-    joints: tuple[str, ...],
-) -> Array:
-    """(nq,) pose with `joints` at the clip's first pose, except those that [initial] names."""
-    once = replace(passage, loop=False, blend=0.0)
-    motion = trajectory_of_clip(model, capture.clip, capture.mapping, once, joints=joints)
-    q = start.copy()
-    q[model.indices_of(motion.dofs)] = motion.position(0.0)
-    for joint in scene.initial.positions:
-        places = model.positions_of(joint)
-        q[places] = start[places]
-    return q
+    motion = partial(trajectory_of_clip, model, capture.clip, capture.mapping, joints=chosen)
+    if passage.blend > 0.0:  # from the clip's first pose, except what [initial] poses
+        first, own = motion(replace(passage, loop=False, blend=0.0)), start
+        start = own.copy()
+        start[model.indices_of(first.dofs)] = first.position(0.0)
+        for joint in scene.initial.positions:
+            places = model.positions_of(joint)
+            start[places] = own[places]
+    return motion(passage, initial=start)
 
 
 def pose_controlled(scene: Scene, model: SolidModel, q: Array) -> None:

@@ -53,10 +53,10 @@ def cross_check(draft: Draft) -> list[str]:
     if unusable := draft.failing(lambda: load_model(scene), table):
         return problems + unusable
     model = load_model(scene)
-    lost = [*check_earlier_joints(draft, model), *check_followers(draft, model)]
+    around = surroundings_of(scene, model, draft.broken)
+    lost = [*check_earlier_joints(draft, around), *check_followers(draft, around)]
     if lost:
         return problems + lost
-    around = surroundings_of(scene, model, draft.broken)
     coupling = scene.fluid.coupling if scene.fluid is not None else "two-way"
     mouths = check_mouths(draft, scene.mouths, coupling, around)
     tables = scene.control, scene.objectives, scene.controller
@@ -89,19 +89,12 @@ def check_without_bodies(draft: Draft) -> Iterator[str]:
     """Tables in NEEDS_BODIES, and keys of [output], of a scene without bodies."""
     if draft.scene.has_bodies or not draft.sound("solids", "human"):
         return
-    for table in NEEDS_BODIES:
-        if draft.gives(table):
-            yield (
-                f"{draft.at(table)}: there are no bodies. "
-                "Add [solids] with a model, or drop this table."
-            )
-    output = draft.scene.output
-    for key, named in (("bodies", output.bodies), ("joints", output.joints)):
-        if named and named is not True:
-            yield (
-                f"{draft.at('output', key)}: there are no bodies. "
-                "Add [solids] with a model, or drop this key."
-            )
+    found = [(draft.at(table), "table") for table in NEEDS_BODIES if draft.gives(table)]
+    for key in ("bodies", "joints"):
+        if getattr(draft.scene.output, key) not in (True, False, ()):
+            found.append((draft.at("output", key), "key"))
+    for where, what in found:
+        yield f"{where}: there are no bodies. Add [solids] with a model, or drop this {what}."
 
 
 def check_bodies(draft: Draft, around: Surroundings) -> Iterator[str]:
@@ -114,20 +107,20 @@ def check_bodies(draft: Draft, around: Surroundings) -> Iterator[str]:
         )
     named, output, followed = [], scene.output, {scene.film.camera.follow} - {"bodies", "nothing"}
     if scene.solids is not None:
-        named += draft.unknown_bodies(model, scene.solids.densities, "solids", "densities")
-        named += _unheld(draft, scene.solids, model)
-    named += draft.unknown_bodies(model, output.bodies, "output", "bodies")
+        named += draft.said(around.unknown_bodies(scene.solids.densities), "solids", "densities")
+        named += _unheld(draft, scene.solids, around)
+    named += draft.said(around.unknown_bodies(output.bodies), "output", "bodies")
     if not isinstance(output.joints, bool):
-        named += draft.unknown_joints(model, output.joints, "output", "joints")
-    named += draft.unknown_bodies(model, followed, "film", "camera", "follow")
-    named += check_followed(draft, model)
+        named += draft.said(around.unknown_joints(output.joints), "output", "joints")
+    named += draft.said(around.unknown_bodies(followed), "film", "camera", "follow")
+    named += check_followed(draft, around)
     for index, wind in enumerate(scene.wind):
-        named += [f"{draft.at('wind', index)}: {problem}" for problem in wind.check(around)]
+        named += draft.said(wind.check(around), "wind", index)
     if scene.policy is not None:
-        named += [f"{draft.at('policy')}: {problem}" for problem in scene.policy.check(around)]
+        named += draft.said(scene.policy.check(around), "policy")
     yield from named
     state = [
-        *check_initial(draft, model),
+        *check_initial(draft, around),
         *check_motions(draft, draft.scene.motion, around),
         *check_formulas(draft, _formulas(draft), scene.constants, scene.frame_times()),
     ]
@@ -137,16 +130,16 @@ def check_bodies(draft: Draft, around: Surroundings) -> Iterator[str]:
         yield from _check_places(draft, model)
 
 
-def _unheld(draft: Draft, solids: SolidsTable, model: SolidModel) -> list[str]:
+def _unheld(draft: Draft, solids: SolidsTable, around: Surroundings) -> list[str]:
     """Joints of [solids] hold that cannot be held."""
     scene, hold = draft.scene, () if isinstance(solids.hold, bool) else solids.hold
     where, problems = draft.at("solids", "hold"), []
     moved = {table.joint: "a [[motion]]" for table in scene.motion}
     moved |= dict.fromkeys(scene.controlled_joints(), "[[control]]")
     for joint in hold:
-        unknown = draft.unknown_joints(model, [joint], "solids", "hold")
+        unknown = draft.said(around.unknown_joints([joint]), "solids", "hold")
         problems += unknown
-        if not unknown and joint_kind(model, joint) == FREE:
+        if not unknown and joint_kind(around.model, joint) == FREE:
             problems.append(f"{where}: '{joint}' is a free joint, by which a body floats. Drop it.")
         elif joint in moved:
             problems.append(f"{where}: joint '{joint}' has {moved[joint]}. Keep one of them.")
@@ -257,10 +250,10 @@ def _check_first_pose(draft: Draft, clip: Clip, table: ClipTable) -> Iterator[st
         )
 
 
-def check_followers(draft: Draft, model: SolidModel) -> Iterator[str]:
+def check_followers(draft: Draft, around: Surroundings) -> Iterator[str]:
     """Joints that follow the clip against the model, and against what else moves them; the clip's
     motion where it can be entered from a pose without fault."""
-    scene = draft.scene
+    scene, model = draft.scene, around.model
     if scene.clip is None:
         return
     capture = capture_of(scene)
@@ -268,7 +261,7 @@ def check_followers(draft: Draft, model: SolidModel) -> Iterator[str]:
     others = scene.moved_joints() | dict.fromkeys(scene.clip.free, "free")
     others |= dict.fromkeys(earlier_joints(scene), "moved by the [earlier] run")
     named = (*scene.clip.mapping, *(scene.clip.joints or ()), *scene.clip.free)
-    unknown = draft.unknown_joints(model, named, "clip")
+    unknown = draft.said(around.unknown_joints(named), "clip")
     yield from unknown
     found = bool(unknown)
     for joint in scene.clip.joints or ():
@@ -289,6 +282,6 @@ def check_followers(draft: Draft, model: SolidModel) -> Iterator[str]:
             f"are {', '.join(capture.clip.names)}. Say in clip.mapping which of them each follows."
         )
         found = True
-    if found or any(check_initial(draft, model)):
+    if found or any(check_initial(draft, around)):
         return
     yield from draft.failing(lambda: clip_motion(scene, model, posed(scene, model).q), "clip")

@@ -12,9 +12,7 @@ from pydantic_core import ErrorDetails
 from flowborne.base.errors import SceneError
 from flowborne.base.phrases import suggestion
 from flowborne.base.tables import BUILT_IN, OWN, OwnTable, Table
-from flowborne.control.surroundings import unknown_bodies, unknown_joints
 from flowborne.scenes.schema import Scene
-from flowborne.solids.model import SolidModel
 
 Key = str | int
 
@@ -206,20 +204,14 @@ class Draft:
         default = Scene.model_fields[table].get_default(call_default_factory=True)
         return table in self.broken or getattr(self.scene, table) != default
 
+    def said(self, problems: Iterable[str], *keys: Key) -> list[str]:
+        """Problems with their place."""
+        return [f"{self.at(*keys)}: {problem}" for problem in problems]
+
     def failing(self, make: Callable[[], object], *keys: Key) -> list[str]:
         """The problems with which `make` fails."""
         try:
             make()
         except SceneError as error:
-            return [f"{self.at(*keys)}: {problem}" for problem in error.problems]
+            return self.said(error.problems, *keys)
         return []
-
-    def unknown_joints(self, model: SolidModel, joints: Iterable[str], *keys: Key) -> list[str]:
-        """The problems of joints that are not in the model."""
-        found = unknown_joints(model, self.scene.model_source, joints)
-        return [f"{self.at(*keys)}: {said}" for said in found]
-
-    def unknown_bodies(self, model: SolidModel, bodies: Iterable[str], *keys: Key) -> list[str]:
-        """The problems of bodies that are not in the model."""
-        found = unknown_bodies(model, self.scene.model_source, bodies)
-        return [f"{self.at(*keys)}: {said}" for said in found]

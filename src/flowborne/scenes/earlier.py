@@ -15,6 +15,7 @@ from flowborne.base.array_file import read_arrays
 from flowborne.base.errors import SceneError
 from flowborne.base.given import read_json
 from flowborne.base.phrases import suggestion
+from flowborne.control.surroundings import Surroundings
 from flowborne.fluid.grid import Array
 from flowborne.motion.clip_curves import columns_of, row_of
 from flowborne.motion.clip_motion import TrajectoryClip
@@ -154,7 +155,7 @@ def _whole(path: Path, earlier: Earlier) -> Earlier:
     return earlier
 
 
-def check_earlier_joints(draft: Draft, model: SolidModel) -> Iterator[str]:
+def check_earlier_joints(draft: Draft, around: Surroundings) -> Iterator[str]:
     """Joints of the earlier run against the model, and against what else moves them."""
     scene, earlier = draft.scene, earlier_of(draft.scene)
     if earlier is None:
@@ -167,7 +168,7 @@ def check_earlier_joints(draft: Draft, model: SolidModel) -> Iterator[str]:
         )
     for joint in joints:
         where = draft.at("earlier", "joints")
-        unknown = draft.unknown_joints(model, [joint], "earlier")
+        unknown = draft.said(around.unknown_joints([joint]), "earlier")
         yield from unknown
         if joint in others:
             yield (
@@ -180,7 +181,7 @@ def check_earlier_joints(draft: Draft, model: SolidModel) -> Iterator[str]:
             end = suggestion(joint, earlier.poses, "They are")
             yield f"{where}: joint '{joint}' was not controlled in the earlier run{end}"
         else:
-            there, here = earlier.poses[joint].shape[1], len(model.positions_of(joint))
+            there, here = earlier.poses[joint].shape[1], len(around.model.positions_of(joint))
             if there != here:
                 yield (
                     f"{where}: joint '{joint}' has {there} numbers in the earlier run and {here} "

@@ -9,6 +9,7 @@ import numpy as np
 
 from flowborne.base.phrases import listed
 from flowborne.base.tables import triple
+from flowborne.control.surroundings import Surroundings
 from flowborne.coupling.window import following
 from flowborne.coupling.world import Fluid
 from flowborne.fluid.boundary import Boundaries
@@ -139,8 +140,7 @@ def check_fluid(draft: Draft) -> Iterator[str]:
     for key, tables in (("sources", scene.sources), ("dye", scene.dye)):
         for index, box in enumerate(tables):
             if isinstance(box, BoxTable):
-                for problem in box.check(scene.domain):
-                    yield f"{draft.at(key, index)}: {problem}"
+                yield from draft.said(box.check(scene.domain), key, index)
     if scene.film.field == "dye" and not scene.scalars() and draft.sound("film", "dye", "mouths"):
         yield (
             f"{draft.at('film', 'field')}: there is no dye to show. Add [[dye]], or show "
@@ -188,9 +188,9 @@ def _check_window(draft: Draft, domain: Domain) -> Iterator[str]:
             )
 
 
-def check_followed(draft: Draft, model: SolidModel) -> Iterator[str]:
+def check_followed(draft: Draft, around: Surroundings) -> Iterator[str]:
     """What the domain follows must be a body that can move."""
-    domain = draft.scene.domain
+    domain, model = draft.scene.domain, around.model
     if domain is None or not domain.follows:
         return
     name, where = domain.follow, draft.at("domain", "follow")
@@ -198,7 +198,7 @@ def check_followed(draft: Draft, model: SolidModel) -> Iterator[str]:
         if not model.moving.any():
             yield f"{where}: no body of the model moves. Drop this key."
         return
-    unknown = draft.unknown_bodies(model, [name], "domain", "follow")
+    unknown = draft.said(around.unknown_bodies([name]), "domain", "follow")
     yield from unknown
     if not unknown and not model.moving[model.body(name)]:
         yield f"{where}: body '{name}' does not move. Name one that does, or give \"bodies\"."

@@ -106,7 +106,8 @@ def _fastest_body(scene: Scene, setup: Setup, dt: float) -> Crossing:
     assert setup.fluid is not None
     model, h = setup.solid, setup.fluid.grid.spacing
     outline, axes = Outline(model), list(setup.fluid.grid.axes)
-    state, floating = initial_state(scene, model), _floating(scene, setup)
+    state, driven = initial_state(scene, model), driven_dofs(scene, model, setup.motions)
+    floating = np.unique(model.dof_root[~driven & (model.dof_body == model.dof_root)])
 
     def moved(start: Array, end: Array, recoils: bool) -> Crossing:
         places = outline.at(start)
@@ -123,13 +124,6 @@ def _fastest_body(scene: Scene, setup: Setup, dt: float) -> Crossing:
         found = [moved(state.q, model.integrate(state.q, state.v, dt), False)]
         found += [moved(*ends, True) for ends in _driven_moves(scene, setup, state.q, dt)]
     return max(found, key=lambda crossing: crossing[1])
-
-
-def _floating(scene: Scene, setup: Setup) -> list[int]:
-    """Children of the world with a free dof on the world."""
-    model = setup.solid
-    free = ~driven_dofs(scene, model, setup.motions) & (model.dof_body == model.dof_root)
-    return [int(root) for root in np.unique(model.dof_root[free])]
 
 
 def rigid_part(places: Array, way: Array, mass: Array) -> Array:
