@@ -167,6 +167,7 @@ class _Run:
         self.folder = folder
         self.files = files
         self.frames = simulation.frames
+        self.taken = earlier_joints(simulation.scene)  # the run may take the earlier one's place
         self.warnings = warnings_of(simulation.scene, simulation.setup)
         self.columns = (*simulation.columns.names, *(f"seconds_{p}" for p in ("total", *PARTS)))
         self.recorder = Recorder(folder)
@@ -312,7 +313,7 @@ class _Run:
     def _write_start(self) -> None:
         """Write all files of frame 0, the checkpoint last."""
         simulation, folder = self.simulation, self.folder
-        _write_model_of(folder, simulation, earlier_joints(simulation.scene))
+        _write_model_of(folder, simulation, self.taken)
         folder.drop_states_after(-1)
         self.history = History.create(folder.history, self.columns)
         self.recorder.write(0, simulation.world, None)
