@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal, Self, get_args
 
 import numpy as np
 from pydantic import Field, Tag, model_validator
 
+from flowborne.base.registry import Registry
 from flowborne.base.tables import (
     BUILT_IN,
     FUNCTION,
@@ -29,7 +30,7 @@ from flowborne.base.tables import (
     triple,
 )
 from flowborne.control.measurement import Measurement
-from flowborne.control.objectives import OBJECTIVES, Objective, ObjectiveCallable, WeightedObjective
+from flowborne.control.objectives import Objective, ObjectiveCallable, WeightedObjective
 from flowborne.control.phases import PhaseAlways, PhaseTable
 from flowborne.control.surroundings import Surroundings, with_parameters
 from flowborne.coupling.motion import Trajectory
@@ -479,15 +480,6 @@ class ObjectivePythonTable(ObjectiveTable):
         return ObjectiveCallable(with_parameters(self.function, self.parameters), self.function)
 
 
-class ObjectiveOwnTable(ObjectiveTable, OwnTable):
-    """A user's objective; all further keys are its parameters."""
-
-    registry = OBJECTIVES
-
-    def build(self, around: Surroundings) -> Objective:
-        return OBJECTIVES.make(self.kind, self.parameters)
-
-
 BuiltInObjective = Annotated[
     ObjectiveEffortTable
     | ObjectiveWindDragTable
@@ -501,6 +493,28 @@ BuiltInObjective = Annotated[
     Field(discriminator="kind"),
     Tag(BUILT_IN),
 ]
+
+OBJECTIVES: Registry[Objective] = Registry(
+    "objective",
+    methods=("value",),
+    taken=[
+        kind
+        for table in get_args(get_args(BuiltInObjective)[0])
+        for kind in get_args(table.model_fields["kind"].annotation)
+    ],
+    keys=ObjectiveTable.model_fields,
+)
+"""Objectives that users have registered."""
+
+
+class ObjectiveOwnTable(ObjectiveTable, OwnTable):
+    """A user's objective; all further keys are its parameters."""
+
+    registry = OBJECTIVES
+
+    def build(self, around: Surroundings) -> Objective:
+        return OBJECTIVES.make(self.kind, self.parameters)
+
 
 AnyObjective = Annotated[
     BuiltInObjective | Annotated[ObjectiveOwnTable, Tag(OWN)], *by_kind_or_own(OBJECTIVES)
