@@ -13,9 +13,9 @@ import pytest
 from numpy.testing import assert_allclose
 
 import flowborne as fb
-from flowborne.control.python_function import WindFunction
 from flowborne.scenes.load import check_scene, library
 from flowborne.scenes.plugins import LOADED
+from flowborne.scenes.wind import WindFunction
 
 PARTS = Path(__file__).parent / "own_parts"
 

@@ -13,7 +13,6 @@ import numpy as np
 from flowborne import Measurement, Scene, Simulation, load_scene
 from flowborne.control.objective_kinds import ObjectiveInputMotionTable
 from flowborne.scenes.build import surroundings_of
-from flowborne.scenes.controller import input_motions
 
 SCENE = "human-wind-all"
 FACTORS = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
@@ -37,7 +36,9 @@ def walked(scene: Scene) -> tuple[float, float]:
     torques of all joints together, N m."""
     angles, torques = [], []
     with Simulation(scene, workers=1) as simulation:
-        wanted = input_motions(scene, surroundings_of(scene, simulation.setup.solid)).values()
+        around = surroundings_of(scene, simulation.setup.solid)
+        tables = [t for t in scene.objectives if isinstance(t, ObjectiveInputMotionTable)]
+        wanted = [table.reference(around) for table in tables]
         for frame in range(FRAMES):
             step = simulation.advance_frame().step
             if frame < FIRST:

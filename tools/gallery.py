@@ -22,7 +22,6 @@ from PIL import Image
 
 from flowborne.scenes.load import load_scene, read_scene, scene_names
 from flowborne.scenes.schema import Scene
-from flowborne.scenes.window import followed_by
 from flowborne.sim.running import RunOutcome, run
 from flowborne.view.pictures import Picture
 from flowborne.view.run import Run
@@ -82,26 +81,26 @@ def has_gas(scene: Scene) -> bool:
     return scene.fluid is not None and scene.fluid.density <= MAX_GAS_DENSITY
 
 
+def follows(scene: Scene) -> bool:
+    """Whether the domain moves with bodies."""
+    return scene.domain is not None and scene.domain.follows
+
+
 OPEN, FLYERS, ROBOTS = "Open water and open air", "Flyers", "Swimming robots"
 
 GROUPS = (
-    Group(OPEN, lambda scene: followed_by(scene) and scene.dimensions == 2, 300),
-    Group(
-        OPEN, lambda scene: followed_by(scene) and has_gas(scene), 320, {"domain.resolution": "36"}
-    ),
+    Group(OPEN, lambda scene: follows(scene) and scene.dimensions == 2, 300),
+    Group(OPEN, lambda scene: follows(scene) and has_gas(scene), 320, {"domain.resolution": "36"}),
     Group(
         OPEN,
-        lambda scene: followed_by(scene) and len(scene.controlled_joints()) >= MANY_JOINTS,
+        lambda scene: follows(scene) and len(scene.controlled_joints()) >= MANY_JOINTS,
         48,
         {"domain.resolution": "36"},
     ),
     Group(
-        OPEN,
-        lambda scene: followed_by(scene) and bool(scene.flesh),
-        40,
-        {"domain.resolution": "30"},
+        OPEN, lambda scene: follows(scene) and bool(scene.flesh), 40, {"domain.resolution": "30"}
     ),
-    Group(OPEN, followed_by, 140),
+    Group(OPEN, follows, 140),
     Group("Walkers", lambda scene: scene.human is not None, 60),
     Group("Blocks in a prescribed wind", lambda scene: scene.domain is None, 80),
     Group("Blocks in a stream", has_inflow, 100, {"domain.resolution": "64"}),
@@ -230,7 +229,7 @@ def camera_of(scene: Scene, camera: CameraShot) -> CameraShot:
     """A camera that fills the picture with a slab's domain: with its middle where a stream passes
     through it, and with the bodies elsewhere. In space, without a domain, and with one that follows
     bodies, the film's own."""
-    if scene.dimensions == 3 or scene.domain is None or followed_by(scene):
+    if scene.dimensions == 3 or scene.domain is None or scene.domain.follows:
         return camera
     (x0, y0), (x1, y1) = scene.domain.lower, scene.domain.upper
     half_height = 0.5 * min(y1 - y0, (x1 - x0) * SIZE[1] / SIZE[0])

@@ -9,8 +9,7 @@ from typing import Any
 from docstrings import prose
 from flowborne.base.registry import Registry
 from flowborne.control.gradients import GRADIENTS
-from flowborne.control.objective_kinds import ObjectiveTable
-from flowborne.control.objectives import OBJECTIVES
+from flowborne.control.objective_kinds import OBJECTIVES, ObjectiveTable
 from flowborne.control.rules import RULES
 from flowborne.runs.exporters import EXPORTERS, own_exporters
 from flowborne.scenes.control import ControllerTable

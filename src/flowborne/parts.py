@@ -35,6 +35,7 @@ from flowborne.control.gradients import (
 )
 from flowborne.control.measurement import Measurement
 from flowborne.control.objective_kinds import (
+    OBJECTIVES,
     ObjectiveDistance,
     ObjectiveDrag,
     ObjectiveEffort,
@@ -45,7 +46,6 @@ from flowborne.control.objective_kinds import (
     ObjectiveWindDrag,
 )
 from flowborne.control.objectives import (
-    OBJECTIVES,
     Objective,
     ObjectiveCallable,
     ObjectiveSum,

@@ -57,7 +57,7 @@ def test_a_rehearsal_goes_from_pose_to_pose_at_steady_rates(
 
     course = course_of(world, step, [[0.2, -0.4], [-0.1, 0.6]])
     objective = ObjectiveSum.of(ObjectiveCallable(noted))
-    value = course.trial(objective, np.array([0.0, 0.0, 0.1, 0.0])).run()
+    value = course.evaluate(objective, np.array([0.0, 0.0, 0.1, 0.0]))
     expected = [
         [0.1, -0.2, 1.0, -2.0],
         [0.2, -0.4, 1.0, -2.0],
@@ -85,7 +85,7 @@ def test_a_plan_keeps_within_strength_and_ranges(make_world: MakeWorld, step: St
 def test_a_ball_joint_stays_within_its_cone_on_a_plan(make_world: MakeWorld, step: Step) -> None:
     world, dofs = make_world(ball=True, limited=True), np.arange(3)
     course = course_of(world, step, [[0.2, 0.4, 0.0], [0.4, -0.6, 0.2]], 1.0, dofs)
-    poses = course.trial(ObjectiveSum.of(ObjectiveCallable(angle)), np.full(6, 0.3)).poses
+    poses = np.array([pose for _, pose in course.poses(course.moves + 0.3)])
     assert len(poses) == 2
     assert np.all(2.0 * np.arccos(np.minimum(np.abs(poses[:, 0]), 1.0)) <= 0.7 + 1e-9)
 
@@ -97,7 +97,7 @@ def test_a_rehearsal_is_what_the_world_then_does(make_world: MakeWorld) -> None:
     before = {name: values.tobytes() for name, values in world.arrays().items()}
     wrist = ObjectiveSum.of(ObjectiveCallable(lambda m: float(m.world.solid.q[2])))
     course = course_of(world, stepping.step, [[0.3, -0.1], [0.0, 0.2]])
-    found = course.trial(wrist, np.zeros(4)).run()
+    found = course.evaluate(wrist, np.zeros(4))
     assert {name: values.tobytes() for name, values in world.arrays().items()} == before
     angles = []
     target = world.solid.q.copy()
@@ -116,7 +116,7 @@ def test_terms_count_while_their_phases_are_on(make_world: MakeWorld, step: Step
         ObjectiveCallable(lambda _: 8.0), 1.0, PhaseIntervals(((0.25, 0.45),), None)
     )
     course = course_of(make_world(), step, [[0.0], [0.0]], dofs=SHOULDER)
-    assert course.trial(ObjectiveSum((late,)), np.zeros(2)).run() == pytest.approx(8.0 * 2 / 4)
+    assert course.evaluate(ObjectiveSum((late,)), np.zeros(2)) == pytest.approx(8.0 * 2 / 4)
 
 
 def planner(every: int = 2, **settings: object) -> Controller:
@@ -204,11 +204,9 @@ def test_a_plan_that_blows_up_says_when_it_was_made(make_world: MakeWorld) -> No
     def broken(world: World, dt: float, command: JointCommand | None = None) -> StepReport:
         return replace(stepping.step(world, dt, command), outcome=Outcome.NOT_FINITE)
 
-    trial = course_of(make_world(), broken, [[0.0]], dofs=SHOULDER).trial(
-        ObjectiveSum.of(ObjectiveCallable(angle)), np.zeros(1)
-    )
+    course = course_of(make_world(), broken, [[0.0]], dofs=SHOULDER)
     with pytest.raises(TrialError, match=r"step of 0\.1 s that follows a plan made at time 0 s, a"):
-        trial.run()
+        course.evaluate(ObjectiveSum.of(ObjectiveCallable(angle)), np.zeros(1))
 
 
 @pytest.mark.parametrize(("dt", "steps", "knots"), [(0.0, 1, 1), (0.1, 0, 1), (0.1, 1, 0)])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ from flowborne.control.gradients import GradientCentral
 from flowborne.control.measurement import Measurement
 from flowborne.control.objectives import ObjectiveCallable, ObjectiveSum
 from flowborne.control.phases import PhaseIntervals
-from flowborne.control.trial import Hypothesis, PoseCourse, Trial, without_scalars
+from flowborne.control.trial import Hypothesis, PoseCourse, without_scalars
 from flowborne.coupling import step as stepping
 from flowborne.coupling.report import Outcome, StepReport
 from flowborne.coupling.world import World
@@ -58,12 +58,19 @@ def angle(measurement: Measurement) -> float:
     return float(measurement.world.solid.q[0])
 
 
-def trial_of(
-    world: World, step: Step, hypothesis: Hypothesis, dofs: np.ndarray, displacement: list[float]
-) -> Trial:
-    objective = ObjectiveSum.of(ObjectiveCallable(angle))
+ANGLE = ObjectiveSum.of(ObjectiveCallable(angle))
+
+
+def value_of(
+    world: World,
+    step: Step,
+    hypothesis: Hypothesis,
+    dofs: np.ndarray,
+    displacement: list[float],
+    objective: ObjectiveSum = ANGLE,
+) -> float:
     course = PoseCourse(world, step, hypothesis, dofs, world.solid.q.copy())
-    return course.trial(objective, np.array(displacement))
+    return course.evaluate(objective, np.array(displacement))
 
 
 @pytest.fixture
@@ -81,7 +88,7 @@ def test_K7_displacement_is_exact_over_any_number_of_steps(
     for steps, settle in ((1, 0), (3, 0), (4, 5)):
         recorder = Recorder(step)
         hypothesis = Hypothesis(0.02, steps, settle)
-        value = trial_of(world, recorder, hypothesis, SHOULDER, [0.17]).run()
+        value = value_of(world, recorder, hypothesis, SHOULDER, [0.17])
         assert value == pytest.approx(0.47, abs=1e-14)
         assert len(recorder.worlds) == steps + settle
         assert recorder.worlds[-1].solid.q == pytest.approx([0.47, -0.2, 0.1], abs=1e-14)
@@ -92,7 +99,7 @@ def test_outboard_joints_are_rigid_and_others_free(make_world: MakeWorld, step: 
     world = make_world()
     world.solid.v[:] = [0.5, 0.6, 0.7]
     recorder = Recorder(step)
-    trial_of(world, recorder, Hypothesis(0.1), np.array([1]), [0.2]).run()
+    value_of(world, recorder, Hypothesis(0.1), np.array([1]), [0.2])
     command = recorder.commands[0]
     assert command.prescribed.tolist() == [False, True, True]
     assert command.rate == pytest.approx([0.0, 2.0, 0.0])
@@ -112,7 +119,7 @@ def test_velocities_that_are_held_are_there_from_the_first_step(
     world.solid.v[:] = [0.5, 0.6, 0.7]
     recorder = Recorder(step)
     hypothesis = Hypothesis(0.05, 2, 3, velocities)  # type: ignore[arg-type]
-    trial_of(world, recorder, hypothesis, np.array([0, 1]), [0.4, 0.0]).run()
+    value_of(world, recorder, hypothesis, np.array([0, 1]), [0.4, 0.0])
     expected = [shoulder, elbow, 0.0]
     for before, command in zip(recorder.before, recorder.commands, strict=True):
         assert command.final_velocity == pytest.approx(expected, abs=1e-12)
@@ -184,18 +191,17 @@ def test_trial_in_a_flow_leaves_it_alone_and_needs_no_dye() -> None:
     value = trials.values(np.array([[0.1]]))
     assert {name: values.tobytes() for name, values in world.arrays().items()} == before
     dyed = PoseCourse(world, stepping.step, controller.hypothesis, controller.dofs, world.solid.q)
-    assert dyed.trial(controller.objective, np.array([0.1])).run() == value
+    assert dyed.evaluate(controller.objective, np.array([0.1])) == value
     assert without_scalars(world).flow()[1].scalars == {}
 
 
 def test_phases_are_those_of_the_decision(make_world: MakeWorld, step: Step) -> None:
     """Not of the hypothetical future, which may already be another phase."""
     world = make_world()
-    trial = trial_of(world, step, Hypothesis(0.5), SHOULDER, [0.2])
     early = PhaseIntervals(((0.0, 0.3),))
-    term = ObjectiveSum.of(ObjectiveCallable(angle)).terms[0]
+    term = ANGLE.terms[0]
     phased = ObjectiveSum((type(term)(term.objective, 2.0, early),))
-    value = replace(trial, objective=phased).run()
+    value = value_of(world, step, Hypothesis(0.5), SHOULDER, [0.2], phased)
     assert value == pytest.approx(0.4)
 
 
@@ -208,17 +214,13 @@ def test_blown_up_trial_says_what_was_tried(
         report.outcome = outcome
         return report
 
-    trial = trial_of(make_world(), blow_up, Hypothesis(0.1), SHOULDER, [0.25])
     with pytest.raises(
         TrialError, match=rf"shoulder by 0\.25 at time 0 s, {outcome.value}; try a smaller"
     ):
-        trial.run()
+        value_of(make_world(), blow_up, Hypothesis(0.1), SHOULDER, [0.25])
     nothing = ObjectiveSum.of(ObjectiveCallable(lambda m: np.nan))
-    trial = replace(
-        trial_of(make_world(), step, Hypothesis(0.1), SHOULDER, [0.25]), objective=nothing
-    )
     with pytest.raises(TrialError, match="the objective is nan"):
-        trial.run()
+        value_of(make_world(), step, Hypothesis(0.1), SHOULDER, [0.25], nothing)
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import pytest
 
 from flowborne.base.errors import SceneError
 from flowborne.runs.run_folder import RunFolder
-from flowborne.scenes.scene_copy import film_settings
+from flowborne.scenes.save import film_settings
 from flowborne.scenes.schema_film import FilmTable
 from flowborne.view.shot import Shot
 

@@ -12,8 +12,7 @@ from flowborne.runs.run_folder import RunFolder
 from flowborne.scenes import flesh as flesh_room
 from flowborne.scenes.build import build
 from flowborne.scenes.load import check_scene, load_scene
-from flowborne.scenes.save import scene_files
-from flowborne.scenes.scene_copy import scene_to_resume, write_scene
+from flowborne.scenes.save import scene_files, scene_to_resume, write_scene
 from flowborne.sim.simulation import BlowUpError, Simulation
 from flowborne.solids.flesh import inversion
 from flowborne.solids.tissue.mesh import FleshMesh

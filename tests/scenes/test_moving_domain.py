@@ -10,8 +10,8 @@ import pytest
 
 import flowborne as fb
 from flowborne.base.errors import SceneError
+from flowborne.scenes.notes import window_notes
 from flowborne.scenes.warn_bodies import fixed_outside
-from flowborne.scenes.window import window_notes
 
 from ..made_runs import numbers, run
 

@@ -11,11 +11,10 @@ import logging
 import os
 import sys
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
 from functools import wraps
 from importlib.metadata import entry_points
-from inspect import Parameter, signature
 from pathlib import Path
 from time import perf_counter
 from typing import Annotated, Any
@@ -119,6 +118,14 @@ def _set(help: str) -> Any:
     return typer.Option("--set", metavar="KEY=VALUE", help=help)
 
 
+SceneArgument = Annotated[
+    str, typer.Argument(metavar="SCENE", help="Name of a built-in scene, or a scene file.")
+]
+WorkersOption = Annotated[
+    int | None, typer.Option(help="Trials of the controller at once; changes no number.")
+]
+PortOption = Annotated[int, typer.Option(min=1, max=65535, help="Port of the page.")]
+HostOption = Annotated[str, typer.Option(help="0.0.0.0 lets other machines connect.")]
 SceneOption = Annotated[list[str] | None, _set("Change a value of the scene.")]
 FolderArgument = Annotated[Path, typer.Argument(metavar="DIR", help="Folder of an earlier run.")]
 
@@ -156,36 +163,9 @@ def scenes() -> None:
         print(f"{name:<{widths[0]}}  {figure:<{widths[1]}}  {description}".rstrip())
 
 
-def _or_clips(run: Callable[..., None]) -> Callable[..., None]:
-    """The command `run` with the option --clips, which runs all clips of a folder."""
-    option = Annotated[
-        Path | None,
-        typer.Option(
-            metavar="DIR",
-            help="Run each BVH clip of this folder, and write a page with the effort of each. "
-            "The same command continues after a stop.",
-        ),
-    ]
-    own = signature(run, eval_str=True)
-    clips = Parameter("clips", Parameter.KEYWORD_ONLY, default=None, annotation=option)
-
-    @wraps(run)
-    def command(clips: Path | None = None, **given: Any) -> None:
-        if clips is None:
-            run(**given)
-        else:
-            _run_clips(clips, given)
-
-    command.__signature__ = own.replace(parameters=[*own.parameters.values(), clips])  # type: ignore[attr-defined]
-    return command
-
-
 @app.command()
-@_or_clips
 def run(
-    scene: Annotated[
-        str, typer.Argument(metavar="SCENE", help="Name of a built-in scene, or a scene file.")
-    ],
+    scene: SceneArgument,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -196,64 +176,63 @@ def run(
         int | None, typer.Option(help="Number of frames.", show_default="from the scene")
     ] = None,
     settings: SceneOption = None,
-    workers: Annotated[
-        int | None, typer.Option(help="Trials of the controller at once; changes no number.")
-    ] = None,
+    workers: WorkersOption = None,
     resume: Annotated[
         bool, typer.Option(help="Continue from the checkpoint in the folder.")
     ] = False,
     replace: Annotated[bool, typer.Option(help="Replace an earlier run in the folder.")] = False,
     film: Annotated[bool, typer.Option(help="Draw preview.png and preview.mp4.")] = True,
+    clips: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR",
+            help="Run each BVH clip of this folder, and write a page with the effort of each. "
+            "The same command continues after a stop.",
+        ),
+    ] = None,
 ) -> None:
     """Run a scene and write its numbers and a film to a folder."""
+    overrides = _overrides(settings)
+    given: dict[str, Any] = {"workers": workers, "replace": replace, "film": film}
+    if clips is None:
+        _run_one(scene, overrides, out, given | {"frames": frames, "resume": resume})
+        return
+    if resume and replace:
+        raise InputError("--resume and --replace exclude each other; give one of them")
+    if frames is not None:
+        overrides["time.frames"] = str(frames)
+    _run_clips(scene, clips, overrides, out, given)
+
+
+def _run_one(
+    scene: str, overrides: dict[str, str], out: Path | None, given: dict[str, Any]
+) -> None:
     from flowborne.base.progress import ProgressDisplay
     from flowborne.scenes.load import load_scene
 
-    loaded = load_scene(scene, _overrides(settings))
+    loaded = load_scene(scene, overrides)
     folder = Path("runs") / loaded.name if out is None else out
-    _say_if_not_drawn(film)
+    _say_if_not_drawn(given["film"])
     with ProgressDisplay() as progress:
         from flowborne.sim.running import RunOutcome
         from flowborne.sim.running import run as run_scene
 
-        result = run_scene(
-            loaded,
-            folder,
-            frames=frames,
-            workers=workers,
-            resume=resume,
-            replace=replace,
-            film=film,
-            progress=progress,
-        )
+        result = run_scene(loaded, folder, progress=progress, **given)
     if result.outcome is not RunOutcome.DONE:
         complain(result.message)
         raise typer.Exit(WARNED if result.outcome is RunOutcome.DOUBTFUL else FAILED)
     print(run_lines(result))
 
 
-def _run_clips(clips: Path, given: dict[str, Any]) -> None:
-    """Run the clips of a folder with the arguments of `run`."""
+def _run_clips(
+    scene: str, clips: Path, overrides: dict[str, str], out: Path | None, given: dict[str, Any]
+) -> None:
     from flowborne.base.progress import ProgressDisplay
     from flowborne.studies.batches import run_clips
 
-    overrides, frames = _overrides(given["settings"]), given["frames"]
-    if given["resume"] and given["replace"]:
-        raise InputError("--resume and --replace exclude each other; give one of them")
-    if frames is not None:
-        overrides["time.frames"] = str(frames)
     _say_if_not_drawn(given["film"])
     with ProgressDisplay() as progress:
-        batch = run_clips(
-            given["scene"],
-            clips,
-            given["out"],
-            overrides=overrides,
-            workers=given["workers"],
-            replace=given["replace"],
-            film=given["film"],
-            progress=progress,
-        )
+        batch = run_clips(scene, clips, out, overrides=overrides, progress=progress, **given)
     print("\n".join(batch_lines(batch)))
     failed = [done for done in batch.clips if done.failure]
     for done in failed:
@@ -370,7 +349,7 @@ def film(
     files = RunFolder.existing(folder)
     check_drawing()
     from flowborne.base.progress import ProgressDisplay, RunProgress
-    from flowborne.scenes.scene_copy import film_settings
+    from flowborne.scenes.save import film_settings
     from flowborne.view.film import make_preview, write_shot
     from flowborne.view.shot import Shot
 
@@ -394,8 +373,8 @@ def view(
     folder: Annotated[
         Path, typer.Argument(metavar="DIR", help="Folder of a run, which may still be running.")
     ],
-    port: Annotated[int, typer.Option(min=1, max=65535, help="Port of the page.")] = 8080,
-    host: Annotated[str, typer.Option(help="0.0.0.0 lets other machines connect.")] = "127.0.0.1",
+    port: PortOption = 8080,
+    host: HostOption = "127.0.0.1",
 ) -> None:
     """View a run in a browser; see docs/viewer.md."""
     optional("pyvista", "PyVista", "view", "views in a browser")
@@ -412,19 +391,15 @@ def view(
 
 @app.command()
 def play(
-    scene: Annotated[
-        str, typer.Argument(metavar="SCENE", help="Name of a built-in scene, or a scene file.")
-    ],
+    scene: SceneArgument,
     settings: SceneOption = None,
     out: Annotated[
         Path | None,
         typer.Option(help="Folder to record to.", show_default="runs/<scene name>-played"),
     ] = None,
-    workers: Annotated[
-        int | None, typer.Option(help="Trials of the controller at once; changes no number.")
-    ] = None,
-    port: Annotated[int, typer.Option(min=1, max=65535, help="Port of the page.")] = 8080,
-    host: Annotated[str, typer.Option(help="0.0.0.0 lets other machines connect.")] = "127.0.0.1",
+    workers: WorkersOption = None,
+    port: PortOption = 8080,
+    host: HostOption = "127.0.0.1",
 ) -> None:
     """Run a scene live in a browser, and change winds, streams and objectives meanwhile; see
     docs/play.md.

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from contextlib import AbstractContextManager, suppress
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from time import perf_counter
@@ -292,7 +292,7 @@ class Controller:
         size, value, evaluations = course.count, 0.0, 0
         gradient = np.zeros(size)
         scale, slope = world.memory.get("step_scale", np.array([np.ones(size), gradient])).copy()
-        limit = self._limit(world.time, frame_time)
+        limit, rule = self._limit(world.time, frame_time), self.rule
         groups = self._groups(world, size)
         for iteration in range(self.iterations):
             displacement = np.zeros(size)
@@ -301,10 +301,15 @@ class Controller:
                 estimate, slopes = self._estimate(trials)
                 if iteration == 0:
                     value, gradient[indices] = value + estimate, slopes
-                scale[indices] = self._step_scale(scale[indices], slope[indices], slopes)
+                ask = partial(rule.step_scale, scale[indices], slope[indices], slopes)
+                expected = "a scale above 0 and at most 1"
+                scale[indices] = _asked("rule", rule, ask, expected, slopes.shape, _is_scale)
                 slope[indices] = slopes
-                wanted = scale[indices] * self._step(trials, slopes, limit[indices])
-                displacement[indices] = trials.within_range(wanted)
+                ask = partial(rule.step, trials, slopes, limit[indices])
+                wanted = _asked(
+                    "rule", rule, ask, "a finite displacement in rad or m", slopes.shape
+                )
+                displacement[indices] = trials.within_range(scale[indices] * wanted)
                 evaluations += trials.evaluations
             if not displacement.any():
                 break
@@ -326,28 +331,15 @@ class Controller:
 
     def _estimate(self, trials: Trials) -> tuple[float, Array]:
         """Objective and its gradient (m,). Raises PartError if the estimate is no such pair."""
-        with _guarding("gradient", self.gradient):
+        with PartError.guarding(
+            f"gradient {type(self.gradient).__name__}", *BREAKDOWNS, MemoryError
+        ):
             estimate = trials.estimator.estimate(trials)
-        value = getattr(estimate, "value", estimate)
-        gradient = getattr(estimate, "gradient", estimate)
+        asked = partial(_asked, "gradient", self.gradient)
         expected = "an Estimate of numbers, whose gradient has one"
-        (number,) = _checked("gradient", self.gradient, [value], expected, (1,))
-        slopes = _checked("gradient", self.gradient, gradient, expected, (trials.count,))
+        (number,) = asked(lambda: [getattr(estimate, "value", estimate)], expected, (1,))
+        slopes = asked(lambda: getattr(estimate, "gradient", estimate), expected, (trials.count,))
         return float(number), slopes
-
-    def _step_scale(self, scale: Array, before: Array, gradient: Array) -> Array:
-        """(m,) the rule's part of strength and probe. Raises PartError if it is not in (0, 1]."""
-        with _guarding("rule", self.rule):
-            given = self.rule.step_scale(scale, before, gradient)
-        expected = "a scale above 0 and at most 1"
-        return _checked("rule", self.rule, given, expected, gradient.shape, _is_scale)
-
-    def _step(self, trials: Trials, gradient: Array, limit: Array) -> Array:
-        """(m,) the rule's displacement. Raises PartError if it is not finite or misshapen."""
-        with _guarding("rule", self.rule):
-            given = self.rule.step(trials, gradient, limit)
-        expected = "a finite displacement in rad or m"
-        return _checked("rule", self.rule, given, expected, gradient.shape)
 
     def _decision(self, world: World, decided: bool, evaluations: int, started: float) -> Decision:
         memory = world.memory
@@ -362,30 +354,25 @@ class Controller:
         )
 
 
-def _checked(
+def _asked(
     kind: str,
     part: object,
-    given: object,
+    ask: Callable[[], object],
     expected: str,
     shape: tuple[int, ...],
     valid: Callable[[Array], Mask] = np.isfinite,
 ) -> Array:
-    """The numbers that a rule or gradient returned. Raises PartError if they are not `expected`."""
+    """The numbers that a rule or gradient returns. Raises PartError if they are not `expected`, or
+    if the part fails; errors of trials pass."""
+    name = f"{kind} {type(part).__name__}"
+    with PartError.guarding(name, *BREAKDOWNS, MemoryError):
+        given = ask()
     with suppress(ArithmeticError, TypeError, ValueError):
         found = np.asarray(given, dtype=np.float64)
         if found.shape == shape and valid(found).all():
             return found
-    raise PartError(
-        f"{kind} {type(part).__name__} gave {given!r:.100}: return {expected} for each of "
-        f"{shape[0]} dofs"
-    )
+    raise PartError(f"{name} gave {given!r:.100}: return {expected} for each of {shape[0]} dofs")
 
 
 def _is_scale(values: Array) -> Mask:
     return (values > 0.0) & (values <= 1.0)
-
-
-def _guarding(kind: str, part: object) -> AbstractContextManager[None]:
-    """Context that makes errors of a rule or gradient PartErrors, except errors of trials."""
-    name = f"{kind} {type(part).__name__}"
-    return PartError.guarding(name, *BREAKDOWNS, MemoryError)

@@ -6,10 +6,11 @@ that looks ahead (`plan`). Gradients and rules only get its variables, in rad or
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from operator import methodcaller
-from typing import TYPE_CHECKING, Protocol, Self
+from functools import partial
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
@@ -30,73 +31,61 @@ Step = Callable[["World", float, JointCommand | None], StepReport]
 class TrialError(ArithmeticError):
     """A hypothetical step, or the objective after it, is not a finite number."""
 
-    @classmethod
-    def of(cls, evaluation: Evaluation, dt: float, what: str) -> TrialError:
-        """The error of a step of dt (s) in an evaluation; `what` is wrong."""
-        return cls(
-            f"in a hypothetical step of {dt:.4g} s that {evaluation.tried}, {what}; "
-            "try a smaller displacement or a shorter step"
-        )
 
-
-def advance(evaluation: Evaluation, world: World, dt: float, command: JointCommand) -> StepReport:
-    """Take `world` through a hypothetical step of an evaluation. Raises TrialError when its numbers
-    are not finite."""
-    report = evaluation.course.step(world, dt, command)
-    if report.outcome in (Outcome.NOT_FINITE, Outcome.ADVECTION_NOT_FINITE):
-        raise TrialError.of(evaluation, dt, report.outcome.value)
-    return report
-
-
-class Evaluation(Protocol):
-    """One evaluation of an objective, complete in itself: it may run in any thread or process.
-
-    tried  what it does to the joints and when, as "moves knee by 0.1 at time 2 s"
-    """
-
-    @property
-    def course(self) -> Course: ...
-
-    @property
-    def tried(self) -> str: ...
-
-    def run(self) -> float:
-        """The objective. Raises TrialError when it is not finite."""
-        ...
-
-
-class Course(Protocol):
+@dataclass(frozen=True, eq=False)
+class Course(ABC):
     """The motion of the controlled joints that a decision changes.
 
     world  the present state; trials step copies of it
     step   the physics
-    count  N, number of decision variables
-    goal   (nq,) pose at the time of the next decision
     """
 
-    @property
-    def world(self) -> World: ...
+    world: World
+    step: Step
 
     @property
-    def step(self) -> Step: ...
+    @abstractmethod
+    def count(self) -> int:
+        """N, number of decision variables."""
 
     @property
-    def count(self) -> int: ...
+    @abstractmethod
+    def goal(self) -> Array:
+        """(nq,) pose at the time of the next decision."""
 
-    @property
-    def goal(self) -> Array: ...
-
+    @abstractmethod
     def within_range(self, displacement: Array) -> Array:
         """(N,) the part of a displacement, rad or m, that the joints allow."""
-        ...
 
-    def trial(self, objective: ObjectiveSum, displacement: Array) -> Evaluation:
-        """Evaluation of the objective on the course displaced by (N,)."""
-        ...
-
+    @abstractmethod
     def displaced(self, displacement: Array) -> Self:
         """The course displaced by (N,)."""
-        ...
+
+    @abstractmethod
+    def evaluate(self, objective: ObjectiveSum, displacement: Array) -> float:
+        """The objective on the course displaced by (N,), complete in itself: it may run in any
+        thread or process. Raises TrialError when it is not finite."""
+
+    @abstractmethod
+    def tried(self, displacement: Array) -> str:
+        """What that does to the joints and when, as "moves knee by 0.1 at time 2 s"."""
+
+    def advance(
+        self, world: World, dt: float, command: JointCommand, displacement: Array
+    ) -> StepReport:
+        """Take `world` through a hypothetical step of an evaluation. Raises TrialError when its
+        numbers are not finite."""
+        report = self.step(world, dt, command)
+        if report.outcome in (Outcome.NOT_FINITE, Outcome.ADVECTION_NOT_FINITE):
+            raise self.error(displacement, dt, report.outcome.value)
+        return report
+
+    def error(self, displacement: Array, dt: float, what: str) -> TrialError:
+        """The error of a step of dt (s) in an evaluation; `what` is wrong."""
+        return TrialError(
+            f"in a hypothetical step of {dt:.4g} s that {self.tried(displacement)}, {what}; "
+            "try a smaller displacement or a shorter step"
+        )
 
 
 @dataclass(eq=False)
@@ -131,9 +120,9 @@ class Trials:
 
     def values(self, displacements: Array) -> Array:
         """(k,) objective on courses displaced by the rows of (k, m). Raises TrialError."""
-        trials = [self.course.trial(self.objective, self._full(row)) for row in displacements]
-        self.evaluations += len(trials)
-        return np.array(self.mapper.map(methodcaller("run"), trials))
+        evaluate = partial(self.course.evaluate, self.objective)
+        self.evaluations += len(displacements)
+        return np.array(self.mapper.map(evaluate, [self._full(row) for row in displacements]))
 
     def _full(self, displacement: Array) -> Array:
         """(N,) a displacement (m,) of all decision variables."""

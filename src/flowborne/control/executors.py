@@ -16,7 +16,7 @@ import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from itertools import chain
+from functools import partial
 from typing import Any, Protocol, TypeVar
 
 from flowborne.base.errors import WorkerError
@@ -37,28 +37,15 @@ class Mapper(Protocol):
         ...
 
     def close(self) -> None:
-        """Stop the workers; a later `map` starts new ones."""
-        ...
+        """Stop the workers, if it has any; a later `map` starts new ones."""
+        return
 
 
-def collect(futures: list[Any]) -> list[Any]:
-    """Results of futures in their order; when one fails, those not yet begun are cancelled."""
-    try:
-        return [future.result() for future in futures]
-    except BaseException:
-        for future in futures:
-            future.cancel()
-        raise
-
-
-class Serial:
+class Serial(Mapper):
     """One evaluation after the other, in the calling thread."""
 
     def map(self, function: Callable[[Task], Answer], tasks: Sequence[Task]) -> list[Answer]:
         return [function(task) for task in tasks]
-
-    def close(self) -> None:
-        """There are no workers to stop."""
 
 
 class Pool:
@@ -74,11 +61,8 @@ class Pool:
             raise ValueError(f"number of workers is {workers}: give at least 1")
         self._executor: Executor | None = None
 
-    def __getstate__(self) -> dict[str, Any]:
-        return {"workers": self.workers}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__init__(state["workers"])  # type: ignore[misc]
+    def __reduce__(self) -> tuple[type[Pool], tuple[int]]:
+        return type(self), (self.workers,)
 
     def share(self, tasks: int) -> int:
         """Number of threads for the kernels of each of some tasks."""
@@ -99,9 +83,8 @@ class Threads(Pool):
             return [function(task) for task in tasks]
         if self._executor is None:
             self._executor = ThreadPoolExecutor(self.workers, thread_name_prefix="evaluation")
-        threads = self.share(len(tasks))
-        submit = self._executor.submit
-        return collect([submit(run_on, threads, function, task) for task in tasks])
+        on_share = partial(run_on, self.share(len(tasks)), function)
+        return list(self._executor.map(on_share, tasks))
 
 
 class Processes(Pool):
@@ -131,14 +114,12 @@ class Processes(Pool):
         if self._executor is None:
             spawn = multiprocessing.get_context("spawn")
             self._executor = ProcessPoolExecutor(self.workers, spawn, end_with_parent)
-        size = math.ceil(len(tasks) / self.workers)
-        parts = [tasks[n : n + size] for n in range(0, len(tasks), max(size, 1))]
-        submit, threads = self._executor.submit, self.share(len(parts))
-        answers = collect([submit(run_all, threads, function, part) for part in parts])
-        return list(chain.from_iterable(answers))
+        size = max(math.ceil(len(tasks) / self.workers), 1)
+        on_share = partial(run_on, self.share(math.ceil(len(tasks) / size)), function)
+        return list(self._executor.map(on_share, tasks, chunksize=size))
 
 
-class Foreign:
+class Foreign(Mapper):
     """Any object with `submit` (giving futures with `result`) or else an ordered `map`.
 
     For example an executor of `concurrent.futures` or mpi4py, or a client of `dask.distributed`;
@@ -156,12 +137,15 @@ class Foreign:
         self.executor = executor
 
     def map(self, function: Callable[[Task], Answer], tasks: Sequence[Task]) -> list[Answer]:
-        if hasattr(self.executor, "submit"):
-            return collect([self.executor.submit(function, task) for task in tasks])
-        return list(self.executor.map(function, tasks))
-
-    def close(self) -> None:
-        """The owner of the executor closes it."""
+        if not hasattr(self.executor, "submit"):
+            return list(self.executor.map(function, tasks))
+        futures = [self.executor.submit(function, task) for task in tasks]
+        try:
+            return [future.result() for future in futures]
+        except BaseException:
+            for future in futures:
+                future.cancel()
+            raise
 
 
 def mapper(executor: str | object = "threads", workers: int | None = None) -> Mapper:
@@ -182,13 +166,6 @@ def mapper(executor: str | object = "threads", workers: int | None = None) -> Ma
     raise ValueError(
         f"executor is {executor!r}: give 'serial', 'threads', 'processes' or an executor object"
     )
-
-
-def run_all(
-    threads: int, function: Callable[[Task], Answer], tasks: Sequence[Task]
-) -> list[Answer]:
-    """Apply the function to each of the tasks, as `run_on`."""
-    return [run_on(threads, function, task) for task in tasks]
 
 
 def run_on(threads: int, function: Callable[[Task], Answer], task: Task) -> Answer:

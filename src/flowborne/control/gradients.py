@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Annotated, Literal, Protocol, Self
+from typing import Annotated, ClassVar, Literal, Protocol, Self
 
 import numpy as np
 from pydantic import Field, Tag
@@ -175,34 +175,32 @@ class GradientOneSided(FiniteDifference):
 class GradientTable(Table):
     """Keys of every gradient."""
 
+    gradient: ClassVar[type[GradientCentral | GradientOneSided]]
+
     def trials(self, dofs: int) -> int:
         """Number of trials for a number of dofs."""
         return 2 * dofs
 
     def build(self, displacement: tuple[float, ...]) -> Gradient:
         """The gradient that the table describes, with d of each dof in rad or m."""
-        raise NotImplementedError
+        return self.gradient(displacement)
 
 
 class GradientCentralTable(GradientTable):
     """Central differences: two trials a dof."""
 
+    gradient = GradientCentral
     kind: Literal["central"]
-
-    def build(self, displacement: tuple[float, ...]) -> GradientCentral:
-        return GradientCentral(displacement)
 
 
 class GradientOneSidedTable(GradientTable):
     """One-sided differences: a trial a dof and one of the present pose."""
 
+    gradient = GradientOneSided
     kind: Literal["one-sided"]
 
     def trials(self, dofs: int) -> int:
         return dofs + 1
-
-    def build(self, displacement: tuple[float, ...]) -> GradientOneSided:
-        return GradientOneSided(displacement)
 
 
 class GradientOwnTable(GradientTable, OwnTable):

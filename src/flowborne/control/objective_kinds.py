@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal, Self, get_args
 
 import numpy as np
 from pydantic import Field, Tag, model_validator
 
+from flowborne.base.registry import Registry
 from flowborne.base.tables import (
     BUILT_IN,
     FUNCTION,
@@ -29,10 +30,9 @@ from flowborne.base.tables import (
     triple,
 )
 from flowborne.control.measurement import Measurement
-from flowborne.control.objectives import OBJECTIVES, Objective, ObjectiveCallable
-from flowborne.control.phases import PhaseTable
-from flowborne.control.python_function import with_parameters
-from flowborne.control.surroundings import Surroundings
+from flowborne.control.objectives import Objective, ObjectiveCallable, WeightedObjective
+from flowborne.control.phases import PhaseAlways, PhaseTable
+from flowborne.control.surroundings import Surroundings, with_parameters
 from flowborne.kernels.arrays import Array, Integers
 from flowborne.motion.tracks import Curve, TrajectoryConstant, TrajectoryKeyframes
 from flowborne.solids.model import HINGE, JOINT_KINDS, SLIDE, SolidModel, joint_kind
@@ -69,6 +69,15 @@ class ObjectiveTable(Table):
     def build(self, around: Surroundings) -> Objective:
         """The objective; requires that `check` finds nothing."""
         raise NotImplementedError
+
+    def term(self, around: Surroundings) -> WeightedObjective:
+        """The objective with its weight, phases and joints."""
+        return WeightedObjective(
+            self.build(around),
+            self.weight if self.goal == "least" else -self.weight,
+            PhaseAlways() if self.phases is None else self.phases.build(around),
+            None if self.wanted_by is None else around.dofs(self.wanted_by),
+        )
 
 
 def unit(direction: Direction) -> Array:
@@ -291,12 +300,8 @@ class ObjectiveInputMotionTable(ObjectiveTable):
     @model_validator(mode="after")
     def _check(self) -> Self:
         if self.times is not None or self.values is not None:
-            check_keyframes(self.keyframe_times(), self.values, "values", least=1)
+            check_keyframes(self.times or (0.0,), self.values, "values", least=1)
         return self
-
-    def keyframe_times(self) -> tuple[float, ...]:
-        """s; 0 for a fixed pose."""
-        return (0.0,) if self.times is None else self.times
 
     @property
     def rests(self) -> bool:
@@ -331,7 +336,7 @@ class ObjectiveInputMotionTable(ObjectiveTable):
         values = tuple(unit * value for value in self.values)
         if len(values) == 1:
             return TrajectoryConstant(dofs, values[0])
-        return TrajectoryKeyframes(dofs, Curve(self.keyframe_times(), values))
+        return TrajectoryKeyframes(dofs, Curve(self.times or (0.0,), values))
 
     def build(self, around: Surroundings) -> ObjectiveInputMotion:
         return ObjectiveInputMotion(around.dofs([self.joint]), self.reference(around))
@@ -474,15 +479,6 @@ class ObjectivePythonTable(ObjectiveTable):
         return ObjectiveCallable(with_parameters(self.function, self.parameters), self.function)
 
 
-class ObjectiveOwnTable(ObjectiveTable, OwnTable):
-    """A user's objective; all further keys are its parameters."""
-
-    registry = OBJECTIVES
-
-    def build(self, around: Surroundings) -> Objective:
-        return OBJECTIVES.make(self.kind, self.parameters)
-
-
 BuiltInObjective = Annotated[
     ObjectiveEffortTable
     | ObjectiveWindDragTable
@@ -496,6 +492,28 @@ BuiltInObjective = Annotated[
     Field(discriminator="kind"),
     Tag(BUILT_IN),
 ]
+
+OBJECTIVES: Registry[Objective] = Registry(
+    "objective",
+    methods=("value",),
+    taken=[
+        kind
+        for table in get_args(get_args(BuiltInObjective)[0])
+        for kind in get_args(table.model_fields["kind"].annotation)
+    ],
+    keys=ObjectiveTable.model_fields,
+)
+"""Objectives that users have registered."""
+
+
+class ObjectiveOwnTable(ObjectiveTable, OwnTable):
+    """A user's objective; all further keys are its parameters."""
+
+    registry = OBJECTIVES
+
+    def build(self, around: Surroundings) -> Objective:
+        return OBJECTIVES.make(self.kind, self.parameters)
+
 
 AnyObjective = Annotated[
     BuiltInObjective | Annotated[ObjectiveOwnTable, Tag(OWN)], *by_kind_or_own(OBJECTIVES)

@@ -13,7 +13,6 @@ from typing import Protocol, SupportsFloat
 import numpy as np
 
 from flowborne.base.errors import PartError
-from flowborne.base.registry import Registry
 from flowborne.control.measurement import Measurement
 from flowborne.control.phases import PhaseAlways, Phases
 from flowborne.kernels.arrays import Integers
@@ -28,26 +27,6 @@ class Objective(Protocol):
     def value(self, measurement: Measurement) -> float:
         """Its value in the measured state."""
         ...
-
-
-OBJECTIVES: Registry[Objective] = Registry(
-    "objective",
-    methods=("value",),
-    taken=(
-        "effort",
-        "wind-drag",
-        "drag",
-        "pressure-drag",
-        "pressure-lift",
-        "input-motion",
-        "velocity",
-        "speed",
-        "distance",
-        "python",
-    ),
-    keys=("goal", "weight", "phases", "wanted_by"),
-)
-"""Objectives that users have registered."""
 
 
 def name_of(objective: Objective) -> str:

@@ -58,13 +58,13 @@ class PhaseIntervals:
                 )
 
     def active(self, time: float) -> bool:
-        return any(self._inside(time + SLACK, start, stop) for start, stop in self.intervals)
-
-    def _inside(self, time: float, start: float, stop: float) -> bool:
-        since = time - start
-        if self.period is not None:
-            since %= self.period
-        return 0.0 <= since < stop - start
+        for start, stop in self.intervals:
+            since = time + SLACK - start
+            if self.period is not None:
+                since %= self.period
+            if 0.0 <= since < stop - start:
+                return True
+        return False
 
 
 @dataclass(frozen=True)

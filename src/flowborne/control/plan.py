@@ -11,19 +11,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from flowborne.control import creature
-from flowborne.control.course import Step, TrialError, advance
+from flowborne.control.course import Course
 from flowborne.control.measurement import Measurement
 from flowborne.control.objectives import ObjectiveSum
 from flowborne.kernels.arrays import Array, Integers
 from flowborne.solids.trajectories import Servo
-
-if TYPE_CHECKING:
-    from flowborne.coupling.world import World
 
 
 @dataclass(frozen=True)
@@ -50,43 +46,9 @@ class Horizon:
 
 
 @dataclass(frozen=True, eq=False)
-class RolloutEvaluation:
-    """One evaluation of a plan, complete in itself: it may run in any thread or process.
-
-    course     gives the world, whose copy is stepped, and the drives
-    objective  what is measured, after each step
-    poses      (knots, nq) of the plan
-    """
-
-    course: PlanCourse
-    objective: ObjectiveSum
-    poses: Array
-
-    def run(self) -> float:
-        """Mean of the objective over the steps. Raises TrialError when it is not finite."""
-        course, horizon = self.course, self.course.horizon
-        world, dt, total = course.world.copy(), horizon.dt, 0.0
-        world.setup = world.setup.rehearsed
-        for pose in self.poses:
-            for left in range(horizon.steps, 0, -1):
-                command = creature.approach(world, course.dofs, course.servo, pose, left * dt, dt)
-                report = advance(self, world, dt, command)
-                total += self.objective.value(Measurement(world, report))
-        if not np.isfinite(total):
-            raise TrialError.of(self, dt, f"the objective is {total}")
-        return total / (len(self.poses) * horizon.steps)
-
-    @property
-    def tried(self) -> str:
-        return f"follows a plan made at time {self.course.world.time:.6g} s"
-
-
-@dataclass(frozen=True, eq=False)
-class PlanCourse:
+class PlanCourse(Course):
     """A plan: the controlled joints move from pose to pose.
 
-    world    the present state
-    step     the physics
     horizon  length of the plan and of its steps
     dofs     (n,) the controlled dofs
     servo    how their drives approach a pose
@@ -94,8 +56,6 @@ class PlanCourse:
     moves    (knots n,) displacement of the dofs from knot to knot, first knot first
     """
 
-    world: World
-    step: Step
     horizon: Horizon
     dofs: Integers
     servo: Servo
@@ -111,12 +71,24 @@ class PlanCourse:
         """(knots n,) the part of a displacement of the moves that strength and the joints' ranges
         allow."""
         wanted = np.clip(self.moves + displacement, -self.most, self.most)
-        allowed = [move[self.dofs] for move, _ in self._poses(wanted)]
+        allowed = [move[self.dofs] for move, _ in self.poses(wanted)]
         return np.concatenate(allowed) - self.moves
 
-    def trial(self, objective: ObjectiveSum, displacement: Array) -> RolloutEvaluation:
-        poses = np.array([pose for _, pose in self._poses(self.moves + displacement)])
-        return RolloutEvaluation(self, objective, poses)
+    def evaluate(self, objective: ObjectiveSum, displacement: Array) -> float:
+        """Mean of the objective over the steps. Raises TrialError when it is not finite."""
+        horizon, world, total = self.horizon, self.world.copy(), 0.0
+        world.setup, dt = world.setup.rehearsed, horizon.dt
+        for _, pose in self.poses(self.moves + displacement):
+            for left in range(horizon.steps, 0, -1):
+                command = creature.approach(world, self.dofs, self.servo, pose, left * dt, dt)
+                report = self.advance(world, dt, command, displacement)
+                total += objective.value(Measurement(world, report))
+        if not np.isfinite(total):
+            raise self.error(displacement, dt, f"the objective is {total}")
+        return total / (horizon.knots * horizon.steps)
+
+    def tried(self, displacement: Array) -> str:
+        return f"follows a plan made at time {self.world.time:.6g} s"
 
     def displaced(self, displacement: Array) -> PlanCourse:
         return replace(self, moves=self.moves + displacement)
@@ -124,9 +96,9 @@ class PlanCourse:
     @property
     def goal(self) -> Array:
         """(nq,) pose at the first knot."""
-        return next(self._poses(self.moves))[1]
+        return next(self.poses(self.moves))[1]
 
-    def _poses(self, moves: Array) -> Iterator[tuple[Array, Array]]:
+    def poses(self, moves: Array) -> Iterator[tuple[Array, Array]]:
         """(nv,) the part of each move of (knots n,) that ranges allow, and the pose (nq,) after."""
         model = self.world.setup.solid
         pose, move = self.world.solid.q, np.zeros(model.nv)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Annotated, Literal, Protocol
+from typing import Annotated, ClassVar, Literal, Protocol
 
 import numpy as np
 from pydantic import Field, Tag
@@ -188,47 +188,35 @@ class QuasiNewton(FullStep):
             return np.zeros_like(gradient)
         from scipy.optimize import minimize  # takes 0.2 s, which other rules save
 
-        search = _Search(poses, gradient, limit, steepest, self.gradients)
+        tried: list[tuple[float, Array]] = []
+
+        def slope(share: Array) -> tuple[float, Array]:
+            """Objective and gradient where each dof is displaced by a share (n,) of its limit, in
+            units of strength and of the steepest slope."""
+            displacement = poses.within_range(share * limit)
+            tried.append((float(poses.values(displacement[None])[0]), displacement))
+            if len(tried) > self.gradients:
+                raise _EnoughError
+            there = poses.gradient(displacement) if share.any() else gradient
+            return tried[-1][0] / steepest, there * limit / steepest
+
         ends = np.array([poses.within_range(-limit), poses.within_range(limit)]) / limit
         with suppress(_EnoughError):
-            minimize(search, np.zeros_like(gradient), jac=True, method="L-BFGS-B", bounds=ends.T)
-        return search.best
+            minimize(slope, np.zeros_like(gradient), jac=True, method="L-BFGS-B", bounds=ends.T)
+        return min(tried, key=lambda one: one[0])[1]
 
 
 class _EnoughError(Exception):
     """The maximum number of gradients has been estimated."""
 
 
-class _Search:
-    """The objective for a minimiser, in units of strength and of the steepest slope, and the best
-    displacement so far."""
-
-    def __init__(
-        self, poses: Poses, gradient: Array, limit: Array, steepest: float, most: int
-    ) -> None:
-        self._poses, self._gradient, self._limit = poses, gradient, limit
-        self._steepest, self._left = steepest, most
-        self._least = np.inf
-        self.best = np.zeros_like(gradient)
-
-    def __call__(self, share: Array) -> tuple[float, Array]:
-        """Objective and gradient where each dof is displaced by a share (n,) of its limit."""
-        displacement = self._poses.within_range(share * self._limit)
-        value = float(self._poses.values(displacement[None])[0])
-        if value < self._least:
-            self._least, self.best = value, displacement
-        if self._left == 0:
-            raise _EnoughError
-        self._left -= 1
-        gradient = self._poses.gradient(displacement) if share.any() else self._gradient
-        return value / self._steepest, gradient * self._limit / self._steepest
-
-
 class RuleTable(Table):
-    """Keys of every rule.
+    """Keys of every rule: the parameters of its class.
 
     estimates  maximum number of gradients in a decision
     """
+
+    rule: ClassVar[type[Rule]]
 
     @property
     def estimates(self) -> int:
@@ -236,16 +224,14 @@ class RuleTable(Table):
 
     def build(self, around: Surroundings) -> Rule:
         """The rule that the table describes."""
-        raise NotImplementedError
+        return self.rule(**self.model_dump(exclude={"kind"}))
 
 
 class RuleFixed(RuleTable):
     """The longest step down the gradient that strength allows."""
 
+    rule = FixedStep
     kind: Literal["fixed"]
-
-    def build(self, around: Surroundings) -> FixedStep:
-        return FixedStep()
 
 
 class RuleResilient(RuleTable):
@@ -255,11 +241,9 @@ class RuleResilient(RuleTable):
            about a cell depends on the grid
     """
 
+    rule = ResilientStep
     kind: Literal["resilient"]
     least: Annotated[float, Field(gt=0, le=1)] = 1.0 / 64.0
-
-    def build(self, around: Surroundings) -> ResilientStep:
-        return ResilientStep(least=self.least)
 
 
 class RuleGoldenSection(RuleTable):
@@ -285,15 +269,13 @@ class RuleQuasiNewton(RuleTable):
     gradients  maximum number in a decision, each in another pose
     """
 
+    rule = QuasiNewton
     kind: Literal["quasi-newton"]
     gradients: Steps = 8
 
     @property
     def estimates(self) -> int:
         return self.gradients
-
-    def build(self, around: Surroundings) -> QuasiNewton:
-        return QuasiNewton(self.gradients)
 
 
 class RuleOwn(RuleTable, OwnTable):

@@ -1,16 +1,19 @@
-"""The parts of a scene that its objectives, phases, rules and winds depend on."""
+"""The parts of a scene that its objectives, phases, rules and winds depend on, and the functions
+that a user wrote for them: "module:function" in a scene."""
 
 from __future__ import annotations
 
+import importlib
+import inspect
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from flowborne.base.errors import SceneError
+from flowborne.base.errors import PartError, SceneError
 from flowborne.base.phrases import suggestion
-from flowborne.control.python_function import with_parameters
 from flowborne.kernels.arrays import Integers
 from flowborne.solids.model import SolidModel, joint_unit
 from flowborne.solids.trajectories import Trajectory
@@ -55,11 +58,20 @@ class Surroundings:
 
     def unknown_joints(self, joints: Iterable[str]) -> Iterator[str]:
         """A complaint for each joint that the model lacks."""
-        return unknown_joints(self.model, self.source, joints)
+        carried = zip(self.model.joint_names, self.model.mj.jnt_bodyid, strict=True)
+        bones = [name for name, body in carried if body < self.model.nbody]  # others are of flesh
+        for joint in joints:
+            if joint not in bones:
+                end = suggestion(joint, bones, "Its joints are")
+                yield f"joint '{joint}' is not in {self.source}{end}"
 
     def unknown_bodies(self, bodies: Iterable[str]) -> Iterator[str]:
         """A complaint for each body that the model lacks."""
-        return unknown_bodies(self.model, self.source, bodies)
+        known = self.model.body_names
+        for body in bodies:
+            if body not in known:
+                end = suggestion(body, known, "Its bodies are")
+                yield f"body '{body}' is not in {self.source}{end}"
 
     def unusable_function(self, name: str, parameters: Mapping[str, Any]) -> Iterator[str]:
         """A complaint where a function "module:function" is not found, or refuses a parameter."""
@@ -86,18 +98,33 @@ class Surroundings:
         return joint_unit(self.model, joint)
 
 
-def unknown_joints(model: SolidModel, source: str, joints: Iterable[str]) -> Iterator[str]:
-    """A complaint for each joint that a model lacks; `source` names the model."""
-    carried = zip(model.joint_names, model.mj.jnt_bodyid, strict=True)
-    bones = [name for name, body in carried if body < model.nbody]  # the others are of flesh
-    for joint in joints:
-        if joint not in bones:
-            yield f"joint '{joint}' is not in {source}{suggestion(joint, bones, 'Its joints are')}"
+def with_parameters(name: str, parameters: Mapping[str, Any]) -> Callable[..., Any]:
+    """The function "module:function" with these parameters set.
 
-
-def unknown_bodies(model: SolidModel, source: str, bodies: Iterable[str]) -> Iterator[str]:
-    """A complaint for each body that a model lacks; `source` names the model."""
-    known = model.body_names
-    for body in bodies:
-        if body not in known:
-            yield f"body '{body}' is not in {source}{suggestion(body, known, 'Its bodies are')}"
+    raises  SceneError when Python does not find it, or when it does not take one of them
+    """
+    module, _, attribute = name.partition(":")
+    try:
+        with PartError.guarding(f"module '{module}'", ModuleNotFoundError):
+            imported = importlib.import_module(module)
+        function = getattr(imported, attribute)
+    except ModuleNotFoundError as error:
+        raise SceneError(
+            f"Python does not find module '{error.name}' of '{name}'. "
+            "Install it, put its folder on PYTHONPATH, or name its file in plugins."
+        ) from None
+    except AttributeError:
+        raise SceneError(
+            f"module '{module}' has no function '{attribute}'. Correct the name."
+        ) from None
+    except PartError as error:
+        raise SceneError(f"{error}.") from error
+    if not callable(function):
+        raise SceneError(f"'{name}' is {function!r} and no function. Correct the name.")
+    if not parameters:
+        return function
+    try:
+        inspect.signature(function).bind_partial(**parameters)
+    except (TypeError, ValueError) as error:
+        raise SceneError(f"function '{name}': {error}. Correct the parameters.") from None
+    return partial(function, **parameters)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from flowborne.control import creature
-from flowborne.control.course import Step, TrialError, advance
+from flowborne.control.course import Course
 from flowborne.control.measurement import Measurement
 from flowborne.control.objectives import ObjectiveSum
 from flowborne.coupling.bodies_step import advance_prescribed
@@ -79,47 +79,78 @@ class Hypothesis:
 
 
 @dataclass(frozen=True, eq=False)
-class Trial:
-    """One evaluation, complete in itself: it may run in any thread or process.
+class PoseCourse(Course):
+    """Going straight to a pose, as in the paper.
 
-    course        gives the world, whose copy is stepped, and the pose before the displacement
-    objective     what is measured
-    displacement  (n,) of the controlled dofs, rad or m
+    hypothesis  how a pose is tried
+    dofs        (n,) the controlled dofs
+    pose        (nq,) from which displacements start, in the flow of `world`
     """
 
-    course: PoseCourse
-    objective: ObjectiveSum
-    displacement: Array
+    hypothesis: Hypothesis
+    dofs: Integers
+    pose: Array
 
-    def run(self) -> float:
+    @property
+    def count(self) -> int:
+        """n."""
+        return int(self.dofs.size)
+
+    @property
+    def goal(self) -> Array:
+        """(nq,) the pose."""
+        return self.pose
+
+    @cached_property
+    def rigid(self) -> Integers:
+        """(k,) dofs outboard of the controlled ones."""
+        return creature.outboard(self.world, self.dofs)
+
+    def within_range(self, displacement: Array) -> Array:
+        """(n,) the part of a displacement that the joints' ranges allow."""
+        model = self.world.setup.solid
+        return creature.within_range(model, self.pose, self._full(displacement))[self.dofs]
+
+    def displaced(self, displacement: Array) -> PoseCourse:
+        pose = creature.moved(self.world.setup.solid, self.pose, self._full(displacement))
+        return replace(self, pose=pose)
+
+    def evaluate(self, objective: ObjectiveSum, displacement: Array) -> float:
         """Objective after the hypothetical steps. Raises TrialError when it is not finite."""
-        hypothesis, dofs = self.course.hypothesis, self.course.dofs
-        world = self.course.world.copy()
+        hypothesis, dofs = self.hypothesis, self.dofs
+        world = self.world.copy()
         world.setup = world.setup.hypothetical
-        world.solid.q[:] = self.course.pose
-        command = self._prepare(world)
+        world.solid.q[:] = self.pose
+        command = self._prepare(world, displacement)
         whole = hypothesis.steps + hypothesis.last_steps
         for number in range(1, whole + 1):
             if number == hypothesis.steps + 1:
                 command.rate[dofs] = self._last_rate(command)
             # only the last step is measured; before it, prescribed motion needs no solve
             if number == whole or not advance_prescribed(world, hypothesis.dt, command):
-                report = advance(self, world, hypothesis.dt, command)
-        value = self.objective.value(Measurement(world, report, self.course.world.time))
+                report = self.advance(world, hypothesis.dt, command, displacement)
+        value = objective.value(Measurement(world, report, self.world.time))
         if not np.isfinite(value):
-            raise TrialError.of(self, hypothesis.dt, f"the objective is {value}")
+            raise self.error(displacement, hypothesis.dt, f"the objective is {value}")
         return value
 
-    def _prepare(self, world: World) -> JointCommand:
+    def tried(self, displacement: Array) -> str:
+        names = self.world.setup.solid.dof_names
+        tried = ", ".join(
+            f"{names[dof]} by {by:.4g}" for dof, by in zip(self.dofs, displacement, strict=True)
+        )
+        return f"moves {tried} at time {self.world.time:.6g} s"
+
+    def _prepare(self, world: World, displacement: Array) -> JointCommand:
         """Make outboard joints rigid; returns the command that moves the controlled dofs.
 
         Every trial makes all dofs outboard of any controlled one rigid, so that trials differ only
         in the displacement.
         """
-        hypothesis, rigid, v = self.course.hypothesis, self.course.rigid, world.solid.v
-        own = ~np.isin(self.course.dofs, world.setup.told.dofs())
-        dofs = self.course.dofs[own]
-        rate = self.displacement[own] / hypothesis.duration
+        hypothesis, rigid, v = self.hypothesis, self.rigid, world.solid.v
+        own = ~np.isin(self.dofs, world.setup.told.dofs())
+        dofs = self.dofs[own]
+        rate = displacement[own] / hypothesis.duration
         if hypothesis.velocities == "present":
             final = v[dofs].copy()
             creature.give_velocity(world, rigid, np.zeros(rigid.size), dofs)
@@ -132,67 +163,13 @@ class Trial:
         command.set(rigid, 0.0, 0.0)
         command.set(dofs, rate, final)
         ahead = hypothesis.last_steps * hypothesis.dt * self._last_rate(command)
-        command.rate[self.course.dofs] -= ahead / hypothesis.duration
+        command.rate[self.dofs] -= ahead / hypothesis.duration
         return command
 
     def _last_rate(self, command: JointCommand) -> Array:
         """(n,) velocity of the controlled dofs' positions in the last steps."""
-        final = command.final_velocity[self.course.dofs]
-        return final if self.course.hypothesis.velocities == "present" else np.zeros_like(final)
-
-    @property
-    def tried(self) -> str:
-        world, dofs = self.course.world, self.course.dofs
-        names = world.setup.solid.dof_names
-        tried = ", ".join(
-            f"{names[dof]} by {by:.4g}" for dof, by in zip(dofs, self.displacement, strict=True)
-        )
-        return f"moves {tried} at time {world.time:.6g} s"
-
-
-@dataclass(frozen=True, eq=False)
-class PoseCourse:
-    """Going straight to a pose, as in the paper.
-
-    world       the present state
-    step        the physics
-    hypothesis  how a pose is tried
-    dofs        (n,) the controlled dofs
-    pose        (nq,) from which displacements start, in the flow of `world`
-    """
-
-    world: World
-    step: Step
-    hypothesis: Hypothesis
-    dofs: Integers
-    pose: Array
-
-    @property
-    def count(self) -> int:
-        """n."""
-        return int(self.dofs.size)
-
-    @cached_property
-    def rigid(self) -> Integers:
-        """(k,) dofs outboard of the controlled ones."""
-        return creature.outboard(self.world, self.dofs)
-
-    def within_range(self, displacement: Array) -> Array:
-        """(n,) the part of a displacement that the joints' ranges allow."""
-        model = self.world.setup.solid
-        return creature.within_range(model, self.pose, self._full(displacement))[self.dofs]
-
-    def trial(self, objective: ObjectiveSum, displacement: Array) -> Trial:
-        return Trial(self, objective, displacement)
-
-    def displaced(self, displacement: Array) -> PoseCourse:
-        pose = creature.moved(self.world.setup.solid, self.pose, self._full(displacement))
-        return replace(self, pose=pose)
-
-    @property
-    def goal(self) -> Array:
-        """(nq,) the pose."""
-        return self.pose
+        final = command.final_velocity[self.dofs]
+        return final if self.hypothesis.velocities == "present" else np.zeros_like(final)
 
     def _full(self, displacement: Array) -> Array:
         """(nv,) a displacement (n,) of the controlled dofs among all."""

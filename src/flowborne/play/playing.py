@@ -19,7 +19,7 @@ from flowborne.runs.checkpoint import load_checkpoint
 from flowborne.runs.recorder import Recorder
 from flowborne.runs.run_folder import RunFolder, RunFolderError
 from flowborne.scenes.changes import ChangeTable
-from flowborne.scenes.scene_copy import with_frames
+from flowborne.scenes.save import with_frames
 from flowborne.scenes.schema import Scene
 from flowborne.sim.running import RunOutcome, run
 from flowborne.sim.simulation import Simulation, Snapshot

@@ -1,25 +1,25 @@
-"""The bodies of a scene: their model, initial state, and steps for their contacts."""
+"""The bodies of a scene: their model, initial state, motions, and steps for their contacts."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from flowborne.base.errors import SceneError
 from flowborne.base.phrases import suggestion
-from flowborne.fluid.grid import Array
+from flowborne.control.surroundings import Surroundings
+from flowborne.kernels.arrays import Array, Integers, Mask
 from flowborne.scenes.capture import clip_motion, human_of, pose_controlled
 from flowborne.scenes.draft import Draft
 from flowborne.scenes.earlier import earlier_joints, earlier_motion
 from flowborne.scenes.flesh import grow
-from flowborne.scenes.holding import held
 from flowborne.scenes.schema import Scene
-from flowborne.scenes.schema_bodies import SolidsTable
 from flowborne.solids import mjcf
-from flowborne.solids.displacing import Displace
+from flowborne.solids.actuators import actuators
 from flowborne.solids.following import follow, posed_flesh
 from flowborne.solids.geoms import floors
 from flowborne.solids.mjcf import Given, MjModel, MjSpec, compiled_quietly
@@ -34,7 +34,10 @@ from flowborne.solids.model import (
     joint_kind,
     joint_unit,
 )
-from flowborne.solids.trajectories import Trajectory
+from flowborne.solids.trajectories import Servo, ServoExact, ServoPD, Trajectory, driven
+
+MODEL = "gravity", "dimensions", "plugins", "solids", "shapes", "flesh", "human", "clip", "earlier"
+"""Keys of a scene on which its model depends."""
 
 
 def load_model(scene: Scene) -> SolidModel:
@@ -42,7 +45,11 @@ def load_model(scene: Scene) -> SolidModel:
 
     raises  SceneError when a file is missing or MuJoCo refuses it
     """
-    return scene.kept.get(scene, _loaded)
+    parts = scene.folder, *(getattr(scene, key) for key in MODEL)
+    if scene.kept.get("parts") != parts:
+        scene.kept.update(parts=parts, model=_loaded(scene))
+    model: SolidModel = scene.kept["model"]
+    return model
 
 
 def _loaded(scene: Scene) -> SolidModel:
@@ -62,25 +69,16 @@ def _loaded(scene: Scene) -> SolidModel:
         raise SceneError(f"there is no model file {path}. Correct solids.model.")
     try:
         if scene.flesh:
-            spec = bones_of(scene)
+            spec, shapes = bones_of(scene), tuple(table.build() for table in scene.shapes)
             grown = grow(spec, scene.flesh, scene.folder)
             return SolidModel.with_flesh(
-                spec,
-                grown,
-                slab=scene.is_slab,
-                gravity=(x, y, z),
-                shapes=tuple(table.build() for table in scene.shapes),
+                spec, grown, slab=scene.is_slab, gravity=(x, y, z), shapes=shapes
             )
         return SolidModel.from_file(
             path, slab=scene.is_slab, gravity=(x, y, z), given=given_of(scene)
         )
     except ValueError as error:
         raise SceneError(" ".join(str(error).split()).removesuffix(".") + ".") from None
-
-
-def displace_of(solids: SolidsTable) -> Displace:
-    table = solids.displace
-    return Displace(table.groups, table.classes, table.names, table.without)
 
 
 def given_of(scene: Scene) -> Given:
@@ -92,7 +90,7 @@ def given_of(scene: Scene) -> Given:
         solids.densities,
         tuple(table.build() for table in scene.shapes),
         solids.floating,
-        displace_of(solids),
+        solids.displace.build(),
         packages_of(scene),
         solids.mend == "hull",
     )
@@ -177,9 +175,9 @@ def initial_state(scene: Scene, model: SolidModel) -> SolidState:
     return state
 
 
-def check_initial(draft: Draft, model: SolidModel) -> Iterator[str]:
+def check_initial(draft: Draft, around: Surroundings) -> Iterator[str]:
     """Problems of [initial] with the model's keyframes and joints."""
-    initial = draft.scene.initial
+    initial, model = draft.scene.initial, around.model
     if initial.keyframe is not None:
         own, where = keyframes(draft.scene, model), draft.at("initial", "keyframe")
         keys = [own.key(n).name for n in range(own.nkey)]
@@ -205,7 +203,7 @@ def check_initial(draft: Draft, model: SolidModel) -> Iterator[str]:
     for key, values in (("positions", initial.positions), ("velocities", initial.velocities)):
         for joint, numbers in values.items():
             where = draft.at("initial", key)
-            unknown = draft.unknown_joint(model, joint, "initial", key)
+            unknown = draft.said(around.unknown_joints([joint]), "initial", key)
             yield from unknown
             if unknown:
                 continue
@@ -255,3 +253,78 @@ def longest_step(model: SolidModel) -> float:
                 constant = mj.geom_solref[[floor, geom], 0].min()
                 longest = min(longest, 0.5 * constant if constant > 0.0 else mj.opt.timestep)
     return longest
+
+
+@dataclass(frozen=True)
+class TrajectoryHeld:
+    """A joint that stays where it is.
+
+    dofs   (k,)
+    place  (m,) rad, m, or a unit quaternion
+    """
+
+    dofs: Integers
+    place: Array
+
+    def position(self, time: float) -> Array:
+        """(m,) as `place`."""
+        return self.place
+
+    def velocity(self, time: float) -> Array:
+        """(k,) zeros."""
+        return np.zeros(len(self.dofs))
+
+
+def driven_dofs(scene: Scene, model: SolidModel, motions: Iterable[Trajectory]) -> Mask:
+    """(nv,) which dofs are moved by motions, the controller or the policy, or locked in a slab."""
+    moved = model.locked.copy()
+    for motion in motions:
+        moved[motion.dofs] = True
+    told = () if scene.policy is None else scene.policy.joints
+    for joint in (*scene.controlled_joints(), *told):
+        moved[model.dofs_of(joint)] = True
+    return moved
+
+
+def undriven(scene: Scene, model: SolidModel, motions: Iterable[Trajectory]) -> list[str]:
+    """Joints between bodies without a drive and without stiffness.
+
+    Joints on the world are left out, as creatures float or swing on them, and so are joints between
+    bones of the same flesh, which stiffens them.
+    """
+    mj, moved, limp = model.mj, driven_dofs(scene, model, motions), []
+    for j, name in enumerate(model.joint_names):
+        body = int(mj.jnt_bodyid[j])
+        if body >= model.nbody or mj.jnt_type[j] not in (HINGE, SLIDE, BALL):
+            continue
+        parent = int(mj.body_parentid[body])
+        ends = {model.body_names[body], model.body_names[parent]}
+        if (
+            parent > 0
+            and mj.jnt_stiffness[j] == 0.0
+            and not moved[model.dofs_of(name)].all()
+            and not any(ends <= set(flesh.bones) for flesh in scene.flesh)
+        ):
+            limp.append(name)
+    return limp
+
+
+def held(
+    scene: Scene, model: SolidModel, motions: Iterable[Trajectory], start: Array
+) -> Iterator[Trajectory]:
+    """Motions of the joints that [solids] hold keeps at `start` (nq,).
+
+    A joint's position actuator becomes its servo; without one the servo is exact.
+    """
+    hold = () if scene.solids is None else scene.solids.hold
+    if isinstance(hold, bool):
+        hold = tuple(undriven(scene, model, motions)) if hold else ()
+    servos: dict[str, Servo] = {
+        a.joint: ServoPD(a.frequency, a.limit or math.inf)
+        for a in actuators(model)
+        if a.kind == "position"
+    }
+    for joint in hold:
+        servo = servos.get(joint, ServoExact())
+        place = start[model.positions_of(joint)]
+        yield driven(TrajectoryHeld(model.dofs_of(joint), place), servo)

@@ -11,16 +11,15 @@ from flowborne.control.objective_kinds import ObjectiveInputMotionTable
 from flowborne.control.surroundings import Surroundings
 from flowborne.coupling.mouths import Mouth
 from flowborne.coupling.world import Setup, World
-from flowborne.fluid.state import FluidState
 from flowborne.motion.clip_motion import TrajectoryClip, TrajectoryPart
 from flowborne.scenes.bodies import initial_state, load_model, posed, trajectories_of
 from flowborne.scenes.capture import capture_of, clip_motion, followers
-from flowborne.scenes.controller import controller_of
+from flowborne.scenes.control import controller_of
 from flowborne.scenes.earlier import earlier_joints
-from flowborne.scenes.fluid import fluid_of
+from flowborne.scenes.fluid import fluid_of, with_window
 from flowborne.scenes.schema import Scene
-from flowborne.scenes.window import with_window
 from flowborne.solids.model import SolidModel
+from flowborne.solids.wind import Wind
 
 
 def surroundings_of(
@@ -88,18 +87,15 @@ def build(scene: Scene, executor: Mapper | None = None) -> Built:
     """
     model = load_model(scene) if scene.has_bodies else SolidModel.empty()
     motions = trajectories_of(scene, model, posed(scene, model).q)
-    fluid, around = fluid_of(scene), surroundings_of(scene, model)
-    winds = tuple(wind for table in scene.wind if (wind := table.build(around)) is not None)
     start = initial_state(scene, model)
-    fluid = None if fluid is None else with_window(fluid, scene, model, start.q)
+    winds, controller = _acting(scene, model, executor or Serial())
+    fluid = with_window(fluid_of(scene), scene, model, start.q)
     setup = Setup(model, fluid, motions, winds, mouths_of(scene, model), splits=True)
     world = World.at_rest(setup)
     world.solid = start
-    if world.fluid is not None:
-        _set_velocity(world.fluid, scene)
-    controller = None
-    if scene.control:
-        controller = controller_of(scene, around, executor or Serial())
+    if world.fluid is not None and scene.fluid is not None:
+        for values, component in zip(world.fluid.velocity, scene.fluid.velocity, strict=True):
+            values.fill(component)
     time = scene.time
     return Built(scene, world, controller, scene.frame_time, time.steps_per_frame, time.frames)
 
@@ -107,26 +103,26 @@ def build(scene: Scene, executor: Mapper | None = None) -> Built:
 def changed(scene: Scene, setup: Setup, executor: Mapper) -> tuple[Setup, Controller | None]:
     """Setup and controller of a scene whose winds, sides, objectives or strengths have changed,
     with the bodies, the motions and the grid of `setup`."""
-    around, fluid = surroundings_of(scene, setup.solid), setup.fluid
-    winds = tuple(wind for table in scene.wind if (wind := table.build(around)) is not None)
+    winds, controller = _acting(scene, setup.solid, executor)
+    fluid = setup.fluid
     if fluid is not None and (other := fluid_of(scene)) is not None:
         fluid = replace(fluid, boundaries=other.boundaries)
-    controller = controller_of(scene, around, executor) if scene.control else None
     return setup.but(winds=winds, fluid=fluid), controller
 
 
-def _set_velocity(state: FluidState, scene: Scene) -> None:
-    """Set the velocity to the initial one on every face."""
-    assert scene.fluid is not None
-    for values, component in zip(state.velocity, scene.fluid.velocity, strict=True):
-        values.fill(component)
+def _acting(
+    scene: Scene, model: SolidModel, executor: Mapper
+) -> tuple[tuple[Wind, ...], Controller | None]:
+    """The winds, and the controller where joints are controlled."""
+    around = surroundings_of(scene, model)
+    winds = tuple(wind for table in scene.wind if (wind := table.build(around)) is not None)
+    if not scene.control:
+        return winds, None
+    tables = scene.control, scene.objectives, scene.controller
+    return winds, controller_of(*tables, scene.frame_time, around, executor)
 
 
 def mouths_of(scene: Scene, model: SolidModel) -> tuple[Mouth, ...]:
     """The mouths, in the order of the file; none without a fluid."""
-    if not scene.has_fluid:
-        return ()
-    return tuple(
-        table.build(model, number, scene.constants)
-        for number, table in enumerate(scene.mouths, start=1)
-    )
+    tables = enumerate(scene.mouths if scene.has_fluid else (), start=1)
+    return tuple(table.build(model, number, scene.constants) for number, table in tables)

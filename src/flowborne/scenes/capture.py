@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from flowborne.motion.human.gait import gait_clip
 from flowborne.motion.human.skeleton import SIDES, standard_skeleton
 from flowborne.scenes.earlier import earlier_joints
 from flowborne.scenes.schema import Scene
-from flowborne.scenes.schema_bodies import ClipTable, HumanTable
+from flowborne.scenes.schema_bodies import HumanTable
 from flowborne.solids.model import SolidModel
 
 
@@ -34,26 +34,21 @@ def capture_of(scene: Scene) -> Capture | None:
         assert scene.human is not None
         found = _walk(scene.human.height)
     else:
-        found = read_clip(
-            scene.folder / table.file, _reading(scene, table), person=scene.human is not None
+        human = scene.human or HumanTable()
+        reading = Reading(
+            None if table.unit == "auto" else table.unit,
+            None if table.up == "auto" else table.up,
+            table.skip,
+            tuple(table.mapping.items()),
+            table.floor,
+            human.mass,
+            human.sex,
         )
+        found = read_clip(scene.folder / table.file, reading, person=scene.human is not None)
         named = _words(scene) if found.held else set()
         if still := tuple(joint for joint in found.held if joint in named):
             found = with_held_joints(found, still)
     return replace(found, clip=found.clip.placed(offset, heading))
-
-
-def _reading(scene: Scene, table: ClipTable) -> Reading:
-    human = scene.human or HumanTable()
-    return Reading(
-        None if table.unit == "auto" else table.unit,
-        None if table.up == "auto" else table.up,
-        table.skip,
-        tuple(table.mapping.items()),
-        table.floor,
-        human.mass,
-        human.sex,
-    )
 
 
 def _words(scene: Scene) -> set[object]:
@@ -136,30 +131,15 @@ def clip_motion(
         blend=table.blend,
         smooth=table.smooth,
     )
-    if passage.blend > 0.0:
-        start = _where_it_begins(scene, model, start, capture, passage, chosen)
-    return trajectory_of_clip(
-        model, capture.clip, capture.mapping, passage, joints=chosen, initial=start
-    )
-
-
-def _where_it_begins(
-    scene: Scene,
-    model: SolidModel,
-    start: Array,
-    capture: Capture,
-    passage: Passage,
-    joints: tuple[str, ...],
-) -> Array:
-    """(nq,) pose with `joints` at the clip's first pose, except those that [initial] names."""
-    once = replace(passage, loop=False, blend=0.0)
-    motion = trajectory_of_clip(model, capture.clip, capture.mapping, once, joints=joints)
-    q = start.copy()
-    q[model.indices_of(motion.dofs)] = motion.position(0.0)
-    for joint in scene.initial.positions:
-        places = model.positions_of(joint)
-        q[places] = start[places]
-    return q
+    motion = partial(trajectory_of_clip, model, capture.clip, capture.mapping, joints=chosen)
+    if passage.blend > 0.0:  # from the clip's first pose, except what [initial] poses
+        first, own = motion(replace(passage, loop=False, blend=0.0)), start
+        start = own.copy()
+        start[model.indices_of(first.dofs)] = first.position(0.0)
+        for joint in scene.initial.positions:
+            places = model.positions_of(joint)
+            start[places] = own[places]
+    return motion(passage, initial=start)
 
 
 def pose_controlled(scene: Scene, model: SolidModel, q: Array) -> None:

@@ -6,25 +6,34 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from flowborne.base.errors import SceneError
 from flowborne.control.surroundings import Surroundings
 from flowborne.coupling.world import Setup
-from flowborne.scenes.bodies import check_initial, initial_state, load_model
+from flowborne.motion.clip import Clip
+from flowborne.scenes.bodies import check_initial, initial_state, load_model, posed
 from flowborne.scenes.build import mouths_of, surroundings_of
-from flowborne.scenes.check_clip import check_clip, check_followers
-from flowborne.scenes.controller import check_control
+from flowborne.scenes.capture import capture_of, clip_motion
+from flowborne.scenes.control import check_control
 from flowborne.scenes.draft import Draft
-from flowborne.scenes.earlier import check_earlier, check_earlier_joints
+from flowborne.scenes.earlier import check_earlier_joints, earlier_joints, earlier_of
 from flowborne.scenes.flesh import check_flesh, check_flesh_places
-from flowborne.scenes.fluid import check_dimensions, check_fluid, fluid_of
+from flowborne.scenes.fluid import check_dimensions, check_fluid, check_followed, fluid_of
 from flowborne.scenes.motions import MotionFormulaTable, check_formulas, check_motions
 from flowborne.scenes.mouths import check_mouth_cells, check_mouths
-from flowborne.scenes.window import check_followed
+from flowborne.scenes.schema_bodies import ClipTable, SolidsTable
 from flowborne.solids.model import FREE, HINGE, SLIDE, SolidModel, joint_kind, joint_unit
 from flowborne.solids.surfaces import geom_boxes
 
 FLOAT32_ROUNDING = float(np.finfo(np.float32).eps)
 """Relative error of the vertices of a mesh, which MuJoCo keeps in single precision."""
+
+JUMP = np.radians(15.0)
+"""Least turn of a joint from the first frame to the second that is looked at."""
+
+JUMPS = 3.0
+"""How much more all joints then turn than between any two later frames, if it is a T-pose."""
+
+MANY = 10
+"""Frames of a clip from which on that can be told."""
 
 
 def cross_check(draft: Draft) -> list[str]:
@@ -33,23 +42,25 @@ def cross_check(draft: Draft) -> list[str]:
     problems = [*check_dimensions(draft), *check_fluid(draft), *check_without_bodies(draft)]
     has_model = scene.solids is not None
     flesh = check_flesh(draft, scene.flesh, slab=scene.is_slab, has_model=has_model)
-    unusable = [*check_earlier(draft), *check_clip(draft), *flesh]
+    earlier = draft.failing(lambda: earlier_of(scene), "earlier")
+    unusable = [*earlier, *check_clip(draft), *flesh]
     problems += unusable
     readable = draft.sound("dimensions", "gravity", "clip", "shapes")
     if unusable or not (readable and scene.has_bodies):
         return problems
-    try:
-        model = load_model(scene)
-    except SceneError as error:
-        table = "human" if scene.human is not None else "flesh" if scene.flesh else "solids"
-        return problems + [f"{draft.at(table)}: {problem}" for problem in error.problems]
-    lost = [*check_earlier_joints(draft, model), *check_followers(draft, model)]
+    table = "human" if scene.human is not None else "flesh" if scene.flesh else "solids"
+    if unusable := draft.failing(lambda: load_model(scene), table):
+        return problems + unusable
+    model = load_model(scene)
+    around = surroundings_of(scene, model, draft.broken)
+    lost = [*check_earlier_joints(draft, around), *check_followers(draft, around)]
     if lost:
         return problems + lost
-    around = surroundings_of(scene, model, draft.broken)
     coupling = scene.fluid.coupling if scene.fluid is not None else "two-way"
     mouths = check_mouths(draft, scene.mouths, coupling, around)
-    problems += [*check_bodies(draft, around), *mouths, *check_control(draft, around)]
+    tables = scene.control, scene.objectives, scene.controller
+    control = check_control(draft, *tables, scene.frame_time, around)
+    problems += [*check_bodies(draft, around), *mouths, *control]
     if problems or not scene.mouths or draft.broken:
         return problems
     setup, start = Setup(model, fluid_of(scene)), initial_state(scene, model)
@@ -77,19 +88,12 @@ def check_without_bodies(draft: Draft) -> Iterator[str]:
     """Tables in NEEDS_BODIES, and keys of [output], of a scene without bodies."""
     if draft.scene.has_bodies or not draft.sound("solids", "human"):
         return
-    for table in NEEDS_BODIES:
-        if draft.gives(table):
-            yield (
-                f"{draft.at(table)}: there are no bodies. "
-                "Add [solids] with a model, or drop this table."
-            )
-    output = draft.scene.output
-    for key, named in (("bodies", output.bodies), ("joints", output.joints)):
-        if named and named is not True:
-            yield (
-                f"{draft.at('output', key)}: there are no bodies. "
-                "Add [solids] with a model, or drop this key."
-            )
+    found = [(draft.at(table), "table") for table in NEEDS_BODIES if draft.gives(table)]
+    for key in ("bodies", "joints"):
+        if getattr(draft.scene.output, key) not in (True, False, ()):
+            found.append((draft.at("output", key), "key"))
+    for where, what in found:
+        yield f"{where}: there are no bodies. Add [solids] with a model, or drop this {what}."
 
 
 def check_bodies(draft: Draft, around: Surroundings) -> Iterator[str]:
@@ -100,25 +104,22 @@ def check_bodies(draft: Draft, around: Surroundings) -> Iterator[str]:
             f"{draft.at('shapes')}: they are on bodies of a model file. "
             "Add [solids] with a model, or drop [[shapes]]."
         )
-    named = []
-    for body in () if scene.solids is None else scene.solids.densities:
-        named += draft.unknown_body(model, body, "solids", "densities")
-    named += _unheld(draft, model)
-    for body in scene.output.bodies:
-        named += draft.unknown_body(model, body, "output", "bodies")
-    joints = scene.output.joints
-    for joint in () if isinstance(joints, bool) else joints:
-        named += draft.unknown_joint(model, joint, "output", "joints")
-    if scene.film.camera.follow not in ("bodies", "nothing"):
-        named += draft.unknown_body(model, scene.film.camera.follow, "film", "camera", "follow")
-    named += check_followed(draft, model)
+    named, output, followed = [], scene.output, {scene.film.camera.follow} - {"bodies", "nothing"}
+    if scene.solids is not None:
+        named += draft.said(around.unknown_bodies(scene.solids.densities), "solids", "densities")
+        named += _unheld(draft, scene.solids, around)
+    named += draft.said(around.unknown_bodies(output.bodies), "output", "bodies")
+    if not isinstance(output.joints, bool):
+        named += draft.said(around.unknown_joints(output.joints), "output", "joints")
+    named += draft.said(around.unknown_bodies(followed), "film", "camera", "follow")
+    named += check_followed(draft, around)
     for index, wind in enumerate(scene.wind):
-        named += [f"{draft.at('wind', index)}: {problem}" for problem in wind.check(around)]
+        named += draft.said(wind.check(around), "wind", index)
     if scene.policy is not None:
-        named += [f"{draft.at('policy')}: {problem}" for problem in scene.policy.check(around)]
+        named += draft.said(scene.policy.check(around), "policy")
     yield from named
     state = [
-        *check_initial(draft, model),
+        *check_initial(draft, around),
         *check_motions(draft, draft.scene.motion, around),
         *check_formulas(draft, _formulas(draft), scene.constants, scene.frame_times()),
     ]
@@ -128,17 +129,16 @@ def check_bodies(draft: Draft, around: Surroundings) -> Iterator[str]:
         yield from _check_places(draft, model)
 
 
-def _unheld(draft: Draft, model: SolidModel) -> list[str]:
+def _unheld(draft: Draft, solids: SolidsTable, around: Surroundings) -> list[str]:
     """Joints of [solids] hold that cannot be held."""
-    scene = draft.scene
-    hold = () if scene.solids is None or scene.solids.hold is True else scene.solids.hold or ()
+    scene, hold = draft.scene, () if isinstance(solids.hold, bool) else solids.hold
     where, problems = draft.at("solids", "hold"), []
     moved = {table.joint: "a [[motion]]" for table in scene.motion}
     moved |= dict.fromkeys(scene.controlled_joints(), "[[control]]")
     for joint in hold:
-        unknown = draft.unknown_joint(model, joint, "solids", "hold")
+        unknown = draft.said(around.unknown_joints([joint]), "solids", "hold")
         problems += unknown
-        if not unknown and joint_kind(model, joint) == FREE:
+        if not unknown and joint_kind(around.model, joint) == FREE:
             problems.append(f"{where}: '{joint}' is a free joint, by which a body floats. Drop it.")
         elif joint in moved:
             problems.append(f"{where}: joint '{joint}' has {moved[joint]}. Keep one of them.")
@@ -202,11 +202,85 @@ def _check_places(draft: Draft, model: SolidModel) -> Iterator[str]:
 
 def _formulas(draft: Draft) -> dict[str, str]:
     """Where each formula is, for a message -> its text."""
-    found = {}
-    for index, motion in enumerate(draft.scene.motion):
-        if isinstance(motion, MotionFormulaTable):
-            found[draft.at("motion", index, "position")] = motion.position
-    for index, mouth in enumerate(draft.scene.mouths):
-        if mouth.factor is not None:
-            found[draft.at("mouths", index, "factor")] = mouth.factor
-    return found
+    motions, mouths = enumerate(draft.scene.motion), enumerate(draft.scene.mouths)
+    positions = [(n, m.position) for n, m in motions if isinstance(m, MotionFormulaTable)]
+    factors = [(n, mouth.factor) for n, mouth in mouths if mouth.factor is not None]
+    return {draft.at("motion", n, "position"): text for n, text in positions} | {
+        draft.at("mouths", n, "factor"): text for n, text in factors
+    }
+
+
+def check_clip(draft: Draft) -> Iterator[str]:
+    """The tables human and clip, and the clip's file, before there is a model."""
+    scene = draft.scene
+    if scene.human is not None and scene.solids is not None:
+        yield f"{draft.at('human')}: there is a [solids] as well. Keep one of the two."
+    if scene.human is not None and scene.is_slab:
+        yield f"{draft.at('human')}: a human needs 3 dimensions, and the scene has 2. Drop one."
+    if scene.clip is None:
+        return
+    if scene.clip.file is None and scene.human is None:
+        if draft.sound("human"):
+            yield (
+                f"{draft.at('clip')}: there is no file, and a walk without one needs a [human]. "
+                "Add clip.file or [human]."
+            )
+        return
+    unusable = draft.failing(lambda: capture_of(scene), "clip")
+    yield from unusable
+    if not unusable and scene.clip.file is not None and (capture := capture_of(scene)):
+        yield from _check_first_pose(draft, capture.clip, scene.clip)
+
+
+def _check_first_pose(draft: Draft, clip: Clip, table: ClipTable) -> Iterator[str]:
+    """A clip that begins with a T-pose, which a recording jumps out of, cannot be followed."""
+    begun = table.start > 0.5 * clip.frame_time or table.smooth is not None
+    if begun or clip.frames < MANY:
+        return
+    turns = clip.rotation_steps()
+    first, later = turns[0], turns[1:]
+    if first.max() > JUMP and first.sum() > JUMPS * later.sum(axis=1).max():
+        joint = clip.names[int(first.argmax())]
+        yield (
+            f"{draft.at('clip')}: from the first frame that is used of {table.file} to the second "
+            f"'{joint}' turns by {np.degrees(first.max()):.3g} degrees, and no joint by more than "
+            f"{np.degrees(later.max()):.3g} between any two after that: the first is a T-pose or "
+            f"the like. Drop it by skip = {table.skip + 1}."
+        )
+
+
+def check_followers(draft: Draft, around: Surroundings) -> Iterator[str]:
+    """Joints that follow the clip against the model, and against what else moves them; the clip's
+    motion where it can be entered from a pose without fault."""
+    scene, model = draft.scene, around.model
+    if scene.clip is None:
+        return
+    capture = capture_of(scene)
+    assert capture is not None
+    others = scene.moved_joints() | dict.fromkeys(scene.clip.free, "free")
+    others |= dict.fromkeys(earlier_joints(scene), "moved by the [earlier] run")
+    named = (*scene.clip.mapping, *(scene.clip.joints or ()), *scene.clip.free)
+    unknown = draft.said(around.unknown_joints(named), "clip")
+    yield from unknown
+    found = bool(unknown)
+    for joint in scene.clip.joints or ():
+        if joint in others:
+            yield (
+                f"{draft.at('clip', 'joints')}: joint '{joint}' is {others[joint]} as well. "
+                "Take it out of one of the two."
+            )
+        if joint not in capture.mapping and joint in model.joint_names:
+            yield (
+                f"{draft.at('clip', 'joints')}: joint '{joint}' has no counterpart in the clip, "
+                f"whose joints are {', '.join(capture.clip.names)}. Add it to clip.mapping."
+            )
+            found = True
+    if not set(capture.mapping) & set(model.joint_names):
+        yield (
+            f"{draft.at('clip')}: the model has no joint with the name of one of the clip's, which "
+            f"are {', '.join(capture.clip.names)}. Say in clip.mapping which of them each follows."
+        )
+        found = True
+    if found or any(check_initial(draft, around)):
+        return
+    yield from draft.failing(lambda: clip_motion(scene, model, posed(scene, model).q), "clip")

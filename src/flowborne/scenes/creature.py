@@ -11,7 +11,7 @@ from flowborne.base.phrases import listed
 from flowborne.coupling.cut import cut_at
 from flowborne.coupling.world import Setup
 from flowborne.fluid.grid import Array
-from flowborne.scenes.bodies import displace_of, initial_state
+from flowborne.scenes.bodies import initial_state
 from flowborne.scenes.schema import Scene
 from flowborne.solids.dynamics import kinematics
 from flowborne.solids.geoms import solid_geoms
@@ -66,13 +66,16 @@ def creature_of(scene: Scene, setup: Setup) -> Creature | None:
     if not scene.has_bodies:
         return None
     counted, start = counted_bodies(model), initial_state(scene, model).q
+    rule = "of each body the visual ones, or the collision ones where those are open or small"
+    if scene.solids is not None and not scene.solids.displace.build().by_rule:
+        rule = "those of [solids] displace"
     return Creature(
         float(model.body_mass[counted].sum()),
         _displaced(setup, start, counted),
         tuple(creature_extent(scene, setup).tolist()),
         len(solid_geoms(model.mj)),
         model.ngeom,
-        _rule(scene),
+        rule,
         tuple(model.body_names[body] for body in unmet_bodies(model)),
     )
 
@@ -108,9 +111,3 @@ def creature_extent(scene: Scene, setup: Setup) -> Array:
     if model.flesh is not None:
         places = np.concatenate([places, model.flesh.rest])
     return np.ptp(places[:, :axes], axis=0) if len(places) else np.zeros(axes)
-
-
-def _rule(scene: Scene) -> str:
-    if scene.solids is not None and not displace_of(scene.solids).by_rule:
-        return "those of [solids] displace"
-    return "of each body the visual ones, or the collision ones where those are open or small"

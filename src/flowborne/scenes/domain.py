@@ -101,6 +101,17 @@ class Domain(Table):
                 "Change cells or the corners, or give resolution alone"
             )
 
+    @property
+    def follows(self) -> bool:
+        """Whether it moves with bodies."""
+        return self.follow != "nothing"
+
+    @property
+    def axes(self) -> tuple[int, ...]:
+        """Axes along which it moves."""
+        along = "xyz"[: len(self.lower)] if self.along is None else self.along
+        return tuple(sorted({"xyz".index(name) for name in along}))
+
     def extent(self) -> list[float]:
         """Length of each side as given, m."""
         return [high - low for low, high in zip(self.lower, self.upper, strict=True)]

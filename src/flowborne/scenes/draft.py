@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import reduce
 from typing import Any, Literal, get_args, get_origin
 
 from pydantic_core import ErrorDetails
 
+from flowborne.base.errors import SceneError
 from flowborne.base.phrases import suggestion
 from flowborne.base.tables import BUILT_IN, OWN, OwnTable, Table
-from flowborne.control.surroundings import unknown_bodies, unknown_joints
 from flowborne.scenes.schema import Scene
-from flowborne.solids.model import SolidModel
 
 Key = str | int
 
@@ -85,7 +85,7 @@ def _tables_in(annotation: Any) -> list[type[Table]]:
     return [table for part in get_args(annotation) for table in _tables_in(part)]
 
 
-def _tables_at(keys: tuple[Key, ...], root: type[Table]) -> list[type[Table]]:
+def _tables_at(keys: Sequence[Key], root: type[Table]) -> list[type[Table]]:
     """The tables that may stand at `keys`, from the top of a file."""
     tables: list[type[Table]] = [root]
     for key in keys:
@@ -126,9 +126,7 @@ def _inside(value: Any, key: Key) -> Any:
 def keys_of(location: tuple[Key, ...], raw: Any, root: type[Table] = Scene) -> tuple[Key, ...]:
     """pydantic's location without the kinds that it puts in where a table was chosen by kind."""
     keys: list[Key] = []
-    tables: list[type[Table]] = [root]
-    value = raw
-    choosing = False
+    value, choosing = raw, False
     for key in location:
         if choosing and key in (BUILT_IN, OWN):
             continue
@@ -137,9 +135,7 @@ def keys_of(location: tuple[Key, ...], raw: Any, root: type[Table] = Scene) -> t
             continue
         keys.append(key)
         value = _inside(value, key)
-        if isinstance(key, str):
-            tables = [inner for table in tables for inner in tables_of(table, key)]
-        choosing = any(_kinds(table) for table in tables)
+        choosing = any(_kinds(table) for table in _tables_at(keys, root))
     return tuple(keys)
 
 
@@ -208,16 +204,14 @@ class Draft:
         default = Scene.model_fields[table].get_default(call_default_factory=True)
         return table in self.broken or getattr(self.scene, table) != default
 
-    def unknown_joint(self, model: SolidModel, joint: str, *keys: Key) -> list[str]:
-        """The problem when `joint` is not in the model."""
-        return [
-            f"{self.at(*keys)}: {said}"
-            for said in unknown_joints(model, self.scene.model_source, [joint])
-        ]
+    def said(self, problems: Iterable[str], *keys: Key) -> list[str]:
+        """Problems with their place."""
+        return [f"{self.at(*keys)}: {problem}" for problem in problems]
 
-    def unknown_body(self, model: SolidModel, body: str, *keys: Key) -> list[str]:
-        """The problem when `body` is not in the model."""
-        return [
-            f"{self.at(*keys)}: {said}"
-            for said in unknown_bodies(model, self.scene.model_source, [body])
-        ]
+    def failing(self, make: Callable[[], object], *keys: Key) -> list[str]:
+        """The problems with which `make` fails."""
+        try:
+            make()
+        except SceneError as error:
+            return self.said(error.problems, *keys)
+        return []

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, Strict, model_validator
 
@@ -51,6 +51,22 @@ class BoxTable(Table):
         check_interval(self.start, self.stop)
         return self
 
+    def source(self, scalars: dict[str, float], **flow: Any) -> Source:
+        """A source in the box."""
+        lower, upper = triple(self.lower), triple(self.upper)
+        times = as_interval(self.start, self.stop)
+        return Source(lower, upper, scalars=dict(scalars), times=times, **flow)
+
+    def check(self, domain: Domain) -> Iterator[str]:
+        """What is wrong with it in a domain."""
+        spans = zip("xyz", self.lower, self.upper, domain.lower, domain.upper, strict=False)
+        for axis, low, high, first, last in spans:
+            if high <= first or low >= last:
+                yield (
+                    f"the box reaches from {low:g} to {high:g} m in {axis}, outside the domain "
+                    f"from {first:g} to {last:g} m. Move it."
+                )
+
 
 class SourceTable(BoxTable):
     """[[sources]]: a box inside the domain where fluid appears or is driven.
@@ -74,14 +90,8 @@ class SourceTable(BoxTable):
 
     def build(self) -> Source:
         """The source."""
-        return Source(
-            triple(self.lower),
-            triple(self.upper),
-            self.volume_rate,
-            None if self.velocity is None else triple(self.velocity),
-            dict(self.dye),
-            as_interval(self.start, self.stop),
-        )
+        velocity = None if self.velocity is None else triple(self.velocity)
+        return self.source(self.dye, volume_rate=self.volume_rate, velocity=velocity)
 
 
 class DyeBands(Table):
@@ -158,12 +168,7 @@ class DyeBox(BoxTable):
 
     def build(self) -> Source:
         """The source that keeps the dye's value."""
-        return Source(
-            triple(self.lower),
-            triple(self.upper),
-            scalars={self.name: self.value},
-            times=as_interval(self.start, self.stop),
-        )
+        return self.source({self.name: self.value})
 
 
 DyeTable = Annotated[DyeBands | DyeBox, *ByKind]
@@ -192,19 +197,4 @@ def check_bands(
                 yield (
                     f"{where}, bands, entry {number}: [{start:g}, {stop:g}] m is beside the side, "
                     f"which reaches from {low:g} to {high:g} m. Move it."
-                )
-
-
-def check_boxes(
-    places: Places, sources: Iterable[SourceTable], dyes: Iterable[DyeTable], domain: Domain
-) -> Iterator[str]:
-    boxes: list[tuple[str, int, BoxTable]] = [("sources", i, s) for i, s in enumerate(sources)]
-    boxes += [("dye", i, dye) for i, dye in enumerate(dyes) if isinstance(dye, DyeBox)]
-    for key, index, box in boxes:
-        spans = zip("xyz", box.lower, box.upper, domain.lower, domain.upper, strict=False)
-        for axis, low, high, first, last in spans:
-            if high <= first or low >= last:
-                yield (
-                    f"{places.at(key, index)}: the box reaches from {low:g} to {high:g} m in "
-                    f"{axis}, outside the domain from {first:g} to {last:g} m. Move it."
                 )

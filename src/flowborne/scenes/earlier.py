@@ -15,6 +15,7 @@ from flowborne.base.array_file import read_arrays
 from flowborne.base.errors import SceneError
 from flowborne.base.given import read_json
 from flowborne.base.phrases import suggestion
+from flowborne.control.surroundings import Surroundings
 from flowborne.fluid.grid import Array
 from flowborne.motion.clip_curves import columns_of, row_of
 from flowborne.motion.clip_motion import TrajectoryClip
@@ -128,11 +129,16 @@ def _read_run(path: Path, stamp: tuple[int, int]) -> Earlier:
     with reading(path):
         model = read_json(folder.model)
         places = {name: slice(*model["places"][name]) for name in model["decided"]}
-        states = [read_state(file, ("time", "q")) for file in sorted(folder.state_files())]
-        times = np.array([float(state["time"]) for state in states])
-        q = np.array([state["q"] for state in states], float)
+        times, q = poses_of(sorted(folder.state_files()))
         found = Earlier(times, {name: q[:, at] for name, at in places.items()})
     return _whole(path, found)
+
+
+def poses_of(states: list[Path]) -> tuple[Array, Array]:
+    """(n,) times, s, and (n, nq) positions of saved states."""
+    found = [read_state(state, ("time", "q")) for state in states]
+    times = np.array([float(state["time"]) for state in found])
+    return times, np.array([state["q"] for state in found], float)
 
 
 def _whole(path: Path, earlier: Earlier) -> Earlier:
@@ -149,15 +155,7 @@ def _whole(path: Path, earlier: Earlier) -> Earlier:
     return earlier
 
 
-def check_earlier(draft: Draft) -> Iterator[str]:
-    """The earlier run itself, before there is a model."""
-    try:
-        earlier_of(draft.scene)
-    except SceneError as error:
-        yield from (f"{draft.at('earlier')}: {problem}" for problem in error.problems)
-
-
-def check_earlier_joints(draft: Draft, model: SolidModel) -> Iterator[str]:
+def check_earlier_joints(draft: Draft, around: Surroundings) -> Iterator[str]:
     """Joints of the earlier run against the model, and against what else moves them."""
     scene, earlier = draft.scene, earlier_of(draft.scene)
     if earlier is None:
@@ -170,7 +168,7 @@ def check_earlier_joints(draft: Draft, model: SolidModel) -> Iterator[str]:
         )
     for joint in joints:
         where = draft.at("earlier", "joints")
-        unknown = draft.unknown_joint(model, joint, "earlier")
+        unknown = draft.said(around.unknown_joints([joint]), "earlier")
         yield from unknown
         if joint in others:
             yield (
@@ -183,13 +181,9 @@ def check_earlier_joints(draft: Draft, model: SolidModel) -> Iterator[str]:
             end = suggestion(joint, earlier.poses, "They are")
             yield f"{where}: joint '{joint}' was not controlled in the earlier run{end}"
         else:
-            yield from _check_width(where, earlier, model, joint)
-
-
-def _check_width(where: str, earlier: Earlier, model: SolidModel, joint: str) -> Iterator[str]:
-    there, here = earlier.poses[joint].shape[1], len(model.positions_of(joint))
-    if there != here:
-        yield (
-            f"{where}: joint '{joint}' has {there} numbers in the earlier run and {here} in this "
-            "model. Take the same model, or leave the joint out."
-        )
+            there, here = earlier.poses[joint].shape[1], len(around.model.positions_of(joint))
+            if there != here:
+                yield (
+                    f"{where}: joint '{joint}' has {there} numbers in the earlier run and {here} "
+                    "in this model. Take the same model, or leave the joint out."
+                )

@@ -77,12 +77,16 @@ class FleshTable(Table):
     def _check(self) -> Self:
         if self.thickness is not None and self.surface is not None:
             raise ValueError("has both a thickness and a surface. Keep one of them")
-        made = self.thickness is not None or self.surface is not None
-        if not made and self.mesh is None:
+        if not self.is_made and self.mesh is None:
             raise ValueError("has neither a thickness nor a surface. Give one of them")
-        if made and self.size is None:
+        if self.is_made and self.size is None:
             raise ValueError("has no size of elements. Give it, in m")
         return self
+
+    @property
+    def is_made(self) -> bool:
+        """Whether it is meshed, and no mesh of the user's own."""
+        return self.thickness is not None or self.surface is not None
 
     def tissue(self) -> Tissue:
         """The material."""
@@ -112,24 +116,21 @@ def meshed(spec: MjSpec, table: FleshTable, folder: Path) -> tuple[FleshMesh, st
     recipe = _recipe(spec, table, folder)
     if table.mesh is not None:
         path = folder / table.mesh
-        as_it_is = table.thickness is None and table.surface is None
-        if as_it_is or (path.exists() and recipe_of(path) == recipe):
+        if not table.is_made or (path.exists() and recipe_of(path) == recipe):
             return _read(path, path.stat().st_mtime_ns if path.exists() else 0), recipe
     if recipe not in _made:
-        _made[recipe] = _mesh(spec, table, folder)
+        assert table.size is not None
+        if table.surface is not None:
+            made = surface_mesh(folder / table.surface, spec, table.bones, table.size)
+        else:
+            assert table.thickness is not None
+            made = skin_mesh(spec, table.bones, table.thickness, table.size)
+        _made[recipe] = made
     return _made[recipe], recipe
 
 
 _made: dict[str, FleshMesh] = {}
 """Meshes of this process by recipe."""
-
-
-def _mesh(spec: MjSpec, table: FleshTable, folder: Path) -> FleshMesh:
-    assert table.size is not None
-    if table.surface is not None:
-        return surface_mesh(folder / table.surface, spec, table.bones, table.size)
-    assert table.thickness is not None
-    return skin_mesh(spec, table.bones, table.thickness, table.size)
 
 
 def _recipe(spec: MjSpec, table: FleshTable, folder: Path) -> str:
@@ -156,7 +157,7 @@ def check_flesh(
 ) -> Iterator[str]:
     """Problems that do not need the mesh."""
     for index, table in enumerate(tables):
-        if slab and (table.thickness is not None or table.surface is not None):
+        if slab and table.is_made:
             yield (
                 f"{places.at('flesh', index)}: flesh is meshed in 3 dimensions alone. Set "
                 "dimensions = 3, or give a mesh of triangles at z = 0 in place of its thickness "

@@ -1,20 +1,27 @@
-"""The fluid of a scene: the checks of all that belongs to it, and its builder."""
+"""The fluid of a scene and the window in which it is simulated: checks and builders."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
+import numpy as np
+
+from flowborne.base.phrases import listed
 from flowborne.base.tables import triple
+from flowborne.control.surroundings import Surroundings
+from flowborne.coupling.cut import following
 from flowborne.coupling.world import Fluid
 from flowborne.fluid.boundary import Boundaries
-from flowborne.fluid.grid import Grid
+from flowborne.fluid.grid import Array, Grid
+from flowborne.fluid.window import crosses
 from flowborne.motion.inflow import Bands, DyeBandsValue
-from flowborne.scenes.domain import check_memory
+from flowborne.scenes.domain import Domain, check_memory
 from flowborne.scenes.draft import Draft, Key
-from flowborne.scenes.dye import DyeBands, DyeBox, check_bands, check_boxes
+from flowborne.scenes.dye import BoxTable, DyeBands, DyeBox, check_bands
 from flowborne.scenes.schema import Scene
-from flowborne.scenes.sides import DyeValue, check_outlet, check_sides
-from flowborne.scenes.window import check_window
+from flowborne.scenes.sides import DyeValue, InflowSide, check_outlet, check_sides
+from flowborne.solids.model import SolidModel
 
 NEEDS_DOMAIN = ("fluid", "boundaries", "sources", "mouths", "dye")
 
@@ -55,6 +62,16 @@ def _entering(side: str, scene: Scene, grid: Grid) -> dict[str, DyeValue]:
     return {name: DyeBandsValue(bands) for name, bands in groups.items()}
 
 
+def with_window(fluid: Fluid | None, scene: Scene, model: SolidModel, q: Array) -> Fluid | None:
+    """The fluid whose grid follows what the scene names, from the positions q (nq,) on."""
+    domain = scene.domain
+    if fluid is None or domain is None or not domain.follows:
+        return fluid
+    named = domain.follow != "bodies"
+    bodies = [model.body(domain.follow)] if named else np.flatnonzero(model.moving).tolist()
+    return following(fluid, model, q, bodies, domain.axes)
+
+
 def check_dimensions(draft: Draft) -> Iterator[str]:
     """Vectors and corners must have the dimensions of the scene."""
     scene = draft.scene
@@ -77,23 +94,14 @@ def check_dimensions(draft: Draft) -> Iterator[str]:
 def _vectors(draft: Draft) -> Iterator[tuple[tuple[Key, ...], tuple[float, ...]]]:
     scene = draft.scene
     yield ("gravity",), scene.gravity
-    if scene.fluid is not None:
-        yield ("fluid", "velocity"), scene.fluid.velocity
-        yield ("fluid", "body_force"), scene.fluid.body_force
-    if scene.boundaries is not None:
-        for name, side in scene.boundaries:
-            if hasattr(side, "velocity"):
-                yield ("boundaries", name, "velocity"), side.velocity
-    for index, source in enumerate(scene.sources):
-        if source.velocity is not None:
-            yield ("sources", index, "velocity"), source.velocity
-    for index, mouth in enumerate(scene.mouths):
-        yield ("mouths", index, "position"), mouth.position
-        yield ("mouths", index, "direction"), mouth.direction
-    for index, wind in enumerate(scene.wind):
-        for key in ("velocity", "force"):
-            if hasattr(wind, key):
-                yield ("wind", index, key), getattr(wind, key)
+    tables: list[tuple[tuple[Key, ...], Any]] = [(("fluid",), scene.fluid)]
+    tables += [(("boundaries", name), side) for name, side in scene.boundaries or ()]
+    for key in ("sources", "mouths", "wind"):
+        tables += [((key, index), table) for index, table in enumerate(getattr(scene, key))]
+    for keys, table in tables:
+        for key in ("velocity", "body_force", "position", "direction", "force"):
+            if (vector := getattr(table, key, None)) is not None:
+                yield (*keys, key), vector
 
 
 def check_fluid(draft: Draft) -> Iterator[str]:
@@ -116,7 +124,7 @@ def check_fluid(draft: Draft) -> Iterator[str]:
     if len(scene.domain.lower) != scene.dimensions:
         return
     yield from check_memory(draft, scene.domain)
-    yield from check_window(draft)
+    yield from _check_window(draft, scene.domain)
     if scene.boundaries is not None and draft.sound("boundaries"):
         yield from check_sides(draft, scene.boundaries, slab=scene.is_slab)
         free = any(side.boundary.free for _, side in scene.boundaries)
@@ -129,9 +137,68 @@ def check_fluid(draft: Draft) -> Iterator[str]:
         if draft.sound("sources"):
             yield from check_outlet(draft, scene.boundaries, scene.domain, rates)
         yield from check_bands(draft, scene.dye, scene.boundaries, scene.domain)
-    yield from check_boxes(draft, scene.sources, scene.dye, scene.domain)
+    for key, tables in (("sources", scene.sources), ("dye", scene.dye)):
+        for index, box in enumerate(tables):
+            if isinstance(box, BoxTable):
+                yield from draft.said(box.check(scene.domain), key, index)
     if scene.film.field == "dye" and not scene.scalars() and draft.sound("film", "dye", "mouths"):
         yield (
             f"{draft.at('film', 'field')}: there is no dye to show. Add [[dye]], or show "
             "vorticity, speed or pressure."
         )
+
+
+def _check_window(draft: Draft, domain: Domain) -> Iterator[str]:
+    """There must be fluid beyond the sides across which the domain moves."""
+    scene, axes = draft.scene, domain.axes
+    if not domain.follows:
+        if domain.along is not None:
+            yield (
+                f"{draft.at('domain', 'along')}: the domain follows nothing. "
+                "Give follow, or drop this key."
+            )
+        return
+    if not scene.has_bodies:
+        yield (
+            f"{draft.at('domain', 'follow')}: there are no bodies. "
+            "Add [solids] with a model, or drop this key."
+        )
+    if scene.is_slab and 2 in axes:
+        yield (
+            f"{draft.at('domain', 'along')}: a scene of 2 dimensions has no z. Give x, y or both."
+        )
+        return
+    if scene.boundaries is None or not draft.sound("boundaries"):
+        return
+    for name, side in scene.boundaries:
+        kind, normal = side.boundary, "xyz".index(name[0])
+        across = ["xyz"[axis] for axis in axes if axis != normal]
+        if normal in axes and not crosses(kind):
+            others = ", ".join(f'"{axis}"' for axis in across)
+            yield (
+                f"{draft.at('boundaries', name)}: the domain follows bodies along {name[0]}, and "
+                f"beyond a {kind.kind} side there is no fluid. Make the side far, open or inflow"
+                + (f", or give [domain] along = [{others}]." if others else ".")
+            )
+        if isinstance(side, InflowSide) and side.profile == "parabolic" and across:
+            yield (
+                f"{draft.at('boundaries', name)}: its profile is 0 at the edges of the side, which "
+                f"move along {listed(across)} with the domain. Give profile = "
+                f'"uniform", or [domain] along = ["{name[0]}"].'
+            )
+
+
+def check_followed(draft: Draft, around: Surroundings) -> Iterator[str]:
+    """What the domain follows must be a body that can move."""
+    domain, model = draft.scene.domain, around.model
+    if domain is None or not domain.follows:
+        return
+    name, where = domain.follow, draft.at("domain", "follow")
+    if name == "bodies":
+        if not model.moving.any():
+            yield f"{where}: no body of the model moves. Drop this key."
+        return
+    unknown = draft.said(around.unknown_bodies([name]), "domain", "follow")
+    yield from unknown
+    if not unknown and not model.moving[model.body(name)]:
+        yield f"{where}: body '{name}' does not move. Name one that does, or give \"bodies\"."

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import csv
 import math
+from contextlib import suppress
 from io import StringIO
 from pathlib import Path
 from typing import Any
@@ -74,19 +75,12 @@ def read_columns(path: Path, column: str, where: str) -> tuple[list[float], list
             continue
         for target, index in zip((times, values), places, strict=True):
             cell = row[index] if index < len(row) else ""
-            number = as_number(cell)
-            if not math.isfinite(number):
-                raise SceneError(
-                    f"{where}: {path.name}, line {line}, column '{header[index]}': "
-                    f"'{cell}' is not a finite number. Give one."
-                )
-            target.append(number)
+            with suppress(ValueError):
+                target.append(float(cell))
+                if math.isfinite(target[-1]):
+                    continue
+            raise SceneError(
+                f"{where}: {path.name}, line {line}, column '{header[index]}': "
+                f"'{cell}' is not a finite number. Give one."
+            )
     return times, values
-
-
-def as_number(text: str) -> float:
-    """The number that a text is; NaN when it is none."""
-    try:
-        return float(text)
-    except ValueError:
-        return math.nan

@@ -35,17 +35,13 @@ def join_elbows(raw: dict[str, Any]) -> None:
     human = raw.get("human")
     if not (isinstance(human, dict) and human.get("elbows") is True):
         return
-    for table, keys in (("control", ("joints",)), ("objectives", ("joints", "wanted_by"))):
-        entries = raw.get(table)
+    for entries in (raw.get("control"), raw.get("objectives")):
         for entry in entries if isinstance(entries, list) else []:
-            for key in keys:
-                if isinstance(entry, dict) and isinstance(entry.get(key), list):
-                    entry[key] = _joined(entry[key])
-
-
-def _joined(joints: list[Any]) -> list[Any]:
-    added = [f"{s}_elbow" for s in SIDES if f"{s}_shoulder" in joints]
-    return [*joints, *(elbow for elbow in added if elbow not in joints)]
+            for key in ("joints", "wanted_by"):
+                joints = entry.get(key) if isinstance(entry, dict) else None
+                if isinstance(joints, list):
+                    added = [f"{side}_elbow" for side in SIDES if f"{side}_shoulder" in joints]
+                    joints += [elbow for elbow in added if elbow not in joints]
 
 
 BUILT_IN = (
@@ -116,10 +112,28 @@ def load_scene(
                names some is refused without it, before any is imported
     raises     SceneError with every problem there is
     """
-    scene, problems = _examine(name_or_path, overrides, trust)
-    if scene is None or problems:
+    path = find(name_or_path)
+    raw = read_tables(path)
+    for key, text in (overrides or {}).items():
+        override(raw, key, text)
+    _check_depth(raw, path)
+    if not trust and (named := python_of(raw)):
+        raise SceneError(
+            f"scene {path.name} brings Python, which can do whatever you can: {', '.join(named)}. "
+            "Read it, then check with --trust, which imports it as a run does."
+        )
+    draft, problems = _understood(raw, path)
+    if draft is None:
         raise SceneError(problems)
-    return scene
+    problems = problems + cross_check(draft)
+    for index, change in enumerate(() if problems else draft.scene.changes, start=1):
+        try:
+            with_values(draft.scene, change.values)
+        except SceneError as error:
+            problems += [f"[[changes]] {index}: {problem}" for problem in error.problems]
+    if problems:
+        raise SceneError(problems)
+    return with_steps(draft.scene)
 
 
 def read_scene(path: Path) -> Scene:
@@ -138,35 +152,11 @@ def read_scene(path: Path) -> Scene:
 
 def check_scene(name_or_path: str | Path, overrides: Mapping[str, str] | None = None) -> list[str]:
     """Everything that is wrong with a scene; an empty list when it is fine."""
-    return _examine(name_or_path, overrides, trust=True)[1]
-
-
-def _examine(
-    name_or_path: str | Path, overrides: Mapping[str, str] | None, trust: bool
-) -> tuple[Scene | None, list[str]]:
     try:
-        path = find(name_or_path)
-        raw = read_tables(path)
-        for key, text in (overrides or {}).items():
-            override(raw, key, text)
-        _check_depth(raw, path)
+        load_scene(name_or_path, overrides)
     except SceneError as error:
-        return None, error.problems
-    if not trust and (named := python_of(raw)):
-        return None, [
-            f"scene {path.name} brings Python, which can do whatever you can: {', '.join(named)}. "
-            "Read it, then check with --trust, which imports it as a run does."
-        ]
-    draft, problems = _understood(raw, path)
-    if draft is None:
-        return None, problems
-    problems = problems + cross_check(draft)
-    for number, change in enumerate(() if problems else draft.scene.changes, start=1):
-        try:
-            with_values(draft.scene, change.values)
-        except SceneError as error:
-            problems += [f"[[changes]] {number}: {problem}" for problem in error.problems]
-    return draft.scene if problems else with_steps(draft.scene), problems
+        return error.problems
+    return []
 
 
 def _understood(raw: dict[str, Any], path: Path) -> tuple[Draft | None, list[str]]:

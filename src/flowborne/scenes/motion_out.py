@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,9 +18,9 @@ from flowborne.motion.clip_curves import UP
 from flowborne.motion.clip_reading import Capture
 from flowborne.motion.quaternions import inverse, product, rotated
 from flowborne.runs.run_folder import STATE_NAME, RunFolder
-from flowborne.runs.states import read_state
 from flowborne.scenes.bodies import load_model
 from flowborne.scenes.capture import capture_of, followers
+from flowborne.scenes.earlier import poses_of
 from flowborne.scenes.load import load_scene
 from flowborne.scenes.schema import Scene
 from flowborne.solids.dynamics import kinematics
@@ -48,7 +48,7 @@ def export_bvh(run: Path, path: Path) -> str:
     states = sorted(p for p in folder.states.iterdir() if STATE_NAME.fullmatch(p.name))
     if len(states) < 2:
         raise SceneError(f"{run} has no motion yet. Continue the run with --resume.")
-    times, q = _poses(states)
+    times, q = poses_of(states)
     model = load_model(scene)
     if scene.clip.file is None:
         write_clip(path, _walked(scene, capture, model, q), 0.01)
@@ -114,14 +114,9 @@ def _unplaced(
 
 def _carried(model: SolidModel, capture: Capture, joint: str) -> list[str]:
     """Joints that the clip has and that hang on one that it lacks."""
-    body = _body(model, joint)
-
-    def nearest(name: str) -> int:
-        bodies = _ancestors(model, name)
-        return next((b for b in bodies if b == body or _mapped(model, capture, b)), 0)
-
+    known = _known(model, capture) | {_body(model, joint): joint}
     names = [name for name in capture.mapping if name in model.joint_names]
-    return [name for name in names if nearest(name) == body]
+    return [name for name in names if _above(model, known, name) == joint]
 
 
 def _left_out(file: str, carried: Mapping[str, Sequence[str]]) -> str:
@@ -131,13 +126,6 @@ def _left_out(file: str, carried: Mapping[str, Sequence[str]]) -> str:
     turned = [bone for bones in carried.values() for bone in bones]
     how = f"turns {', '.join(turned)} there and moves nothing" if turned else "is left out"
     return f"{file} has no joint for {', '.join(carried)}: its motion {how}; .usd and .glb have it"
-
-
-def _poses(states: list[Path]) -> tuple[Array, Array]:
-    """(n,) times, s, and (n, nq) positions of all states."""
-    found = [read_state(state, ("time", "q")) for state in states]
-    times = np.array([float(state["time"]) for state in found])
-    return times, np.array([state["q"] for state in found], float)
 
 
 def _frames(scene: Scene, clip: Clip, simulated: float) -> tuple[Integers, int]:
@@ -158,12 +146,11 @@ def _relative(model: SolidModel, capture: Capture, q: Array) -> dict[str, Rotati
     rest = Rotation.from_matrix(kinematics(model, model.rest().q).body_rotation)
     turns = [Rotation.from_matrix(kinematics(model, row).body_rotation) * rest.inv() for row in q]
     matrices = np.array([turn.as_matrix() for turn in turns])
-    found = {}
+    found, known = {}, _known(model, capture)
     for joint in capture.mapping:
         if joint in model.joint_names:
-            body = _body(model, joint)
-            above = _above(model, capture, joint)
-            turn = Rotation.from_matrix(matrices[:, body])
+            above = _above(model, known, joint)
+            turn = Rotation.from_matrix(matrices[:, _body(model, joint)])
             if above is not None:
                 turn = Rotation.from_matrix(matrices[:, _body(model, above)]).inv() * turn
             found[joint] = turn
@@ -174,31 +161,24 @@ def _body(model: SolidModel, joint: str) -> int:
     return int(model.mj.jnt_bodyid[model.joint(joint)])
 
 
-def _above(model: SolidModel, capture: Capture, joint: str) -> str | None:
-    """The nearest joint above that the clip has too."""
-    bodies = _ancestors(model, joint)
-    return next((name for body in bodies for name in _mapped(model, capture, body)), None)
+def _known(model: SolidModel, capture: Capture) -> dict[int, str]:
+    """Body -> its first joint that the clip has."""
+    names = [name for name in model.joint_names if name in capture.mapping]
+    return {_body(model, name): name for name in reversed(names)}
 
 
-def _ancestors(model: SolidModel, joint: str) -> Iterator[int]:
-    """Bodies above that of a joint, without the world, from the nearest."""
+def _above(model: SolidModel, known: Mapping[int, str], joint: str) -> str | None:
+    """The known joint of the nearest body above that of a joint."""
     parents = model.mj.body_parentid
     body = int(parents[_body(model, joint)])
-    while body > 0:
-        yield body
+    while body > 0 and body not in known:
         body = int(parents[body])
-
-
-def _mapped(model: SolidModel, capture: Capture, body: int) -> list[str]:
-    """Joints of a body that the clip has."""
-    first = int(model.mj.body_jntadr[body])
-    names = model.joint_names[first : first + int(model.mj.body_jntnum[body])]
-    return [name for name in names if name in capture.mapping]
+    return known.get(body)
 
 
 def _between(capture: Capture, model: SolidModel, joint: str, frames: Integers) -> Rotation:
     """What the clip's joints between a joint and the one above it turn by together."""
-    clip, above = capture.clip, _above(model, capture, joint)
+    clip, above = capture.clip, _above(model, _known(model, capture), joint)
     stop = -1 if above is None else clip.names.index(capture.mapping[above])
     turn = Rotation.identity(len(frames))
     parent = int(clip.parents[clip.names.index(capture.mapping[joint])])

@@ -20,10 +20,10 @@ from flowborne.motion.human.clip_skeleton import lost_bones
 from flowborne.motion.human.skeleton import PARENTS
 from flowborne.scenes.bodies import own_pose, posed, spec_of
 from flowborne.scenes.capture import capture_of
+from flowborne.scenes.dye import DyeBox
 from flowborne.scenes.earlier import earlier_of
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.schema_bodies import SolidsTable
-from flowborne.scenes.window import window_notes
 from flowborne.solids.geoms import floors
 from flowborne.solids.mending import joined_pairs, mended_meshes
 from flowborne.solids.mjcf import MjSpec
@@ -212,4 +212,28 @@ def _inserted_bones(file: str, capture: Capture) -> Iterator[str]:
             f"[clip]: {file} has no bone above '{capture.mapping[joint]}', as BVH files of the CMU "
             f"database; one of {100.0 * float(np.linalg.norm(bone)):.2g} cm is put in, so that "
             "head and shoulders are where anatomy has them, higher than in the file"
+        )
+
+
+def window_notes(scene: Scene) -> Iterator[str]:
+    """What a domain that moves leaves behind."""
+    domain = scene.domain
+    if domain is None or not domain.follows:
+        return
+    axes = domain.axes
+    along = "" if len(axes) == scene.dimensions else f" along {listed(['xyz'[a] for a in axes])}"
+    yield (
+        f"[domain]: it follows {domain.follow}{along}, and vortices and dye that it leaves behind "
+        "are lost"
+    )
+    fixed = [f"[[sources]] {n}" for n, _ in enumerate(scene.sources, start=1)]
+    fixed += [
+        f"[[dye]] {n}"
+        for n, dye in enumerate(scene.dye, start=1)
+        if isinstance(dye, DyeBox) or dye.axis in axes
+    ]
+    if fixed:
+        yield (
+            f"[domain]: {listed(fixed)} {'stays' if len(fixed) == 1 else 'stay'} in place, and "
+            f"{'acts' if len(fixed) == 1 else 'act'} only while the domain is there"
         )

@@ -10,8 +10,7 @@ from pydantic import Field
 from flowborne.base.errors import PartError
 from flowborne.base.tables import Table, Text
 from flowborne.control.objective_kinds import FUNCTION, Parameters
-from flowborne.control.python_function import with_parameters
-from flowborne.control.surroundings import Surroundings
+from flowborne.control.surroundings import Surroundings, with_parameters
 
 
 class PolicyTable(Table):

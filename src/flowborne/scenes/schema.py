@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self, TypeVar
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 import tomli_w
@@ -109,34 +108,12 @@ class OutputTable(Table):
     exports: tuple[Annotated[ExportTable, BeforeValidator(_named_file)], ...] = ()
 
 
-Made = TypeVar("Made")
-
-MODEL = "gravity", "dimensions", "plugins", "solids", "shapes", "flesh", "human", "clip", "earlier"
-"""Keys on which the model of a scene depends."""
-
-
-class Kept:
-    """Cache of one object that is made of a scene, valid while the tables in MODEL are the same.
-
-    It does not take part in comparisons, and copies by pickle are empty.
-    """
-
-    def __init__(self) -> None:
-        self._made: tuple[Any, Any] | None = None
-
-    def get(self, scene: Scene, make: Callable[[Scene], Made]) -> Made:
-        """The result of `make`, or that of an earlier call for the same tables."""
-        parts = scene.folder, *(getattr(scene, key) for key in MODEL)
-        if self._made is None or self._made[0] != parts:
-            self._made = parts, make(scene)
-        made: Made = self._made[1]
-        return made
+class Kept(dict[str, Any]):
+    """Cache of what is made of a scene. It does not take part in comparisons, and copies by pickle
+    are empty."""
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Kept)
-
-    def __hash__(self) -> int:
-        return 0
 
     def __reduce__(self) -> tuple[type[Kept], tuple[()]]:
         return Kept, ()

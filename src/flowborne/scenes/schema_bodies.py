@@ -28,6 +28,7 @@ from flowborne.base.tables import (
 )
 from flowborne.fluid.grid import Array
 from flowborne.shapes.own import SHAPES, PlacedShape
+from flowborne.solids.displacing import Displace
 
 
 class DisplaceTable(Table):
@@ -46,6 +47,10 @@ class DisplaceTable(Table):
     classes: tuple[Text, ...] = ()
     names: tuple[Text, ...] = ()
     without: tuple[Text, ...] = ()
+
+    def build(self) -> Displace:
+        """The rule."""
+        return Displace(self.groups, self.classes, self.names, self.without)
 
 
 class SolidsTable(Table):

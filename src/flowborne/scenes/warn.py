@@ -16,10 +16,9 @@ from flowborne.control.objective_kinds import ObjectiveInputMotionTable
 from flowborne.coupling.world import TRIAL_TOLERANCE, Setup
 from flowborne.motion.clip_reading import MIN_STANDING_COSINE, standing_axis
 from flowborne.motion.tracks import SPEED_SAMPLES
+from flowborne.scenes.bodies import undriven
 from flowborne.scenes.build import surroundings_of
 from flowborne.scenes.capture import capture_of
-from flowborne.scenes.controller import input_motions
-from flowborne.scenes.holding import undriven
 from flowborne.scenes.motions import ServoPDTable
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.warn_bodies import (
@@ -85,17 +84,18 @@ def too_slow(scene: Scene, setup: Setup) -> Iterator[str]:
     if isinstance(able.servo, ServoPDTable):
         share = min(1.0, np.pi * able.servo.frequency * time)
     times = np.linspace(0.0, scene.time.frames * scene.frame_time, SPEED_SAMPLES)
-    for number, motion in input_motions(scene, surroundings_of(scene, model)).items():
-        table = scene.objectives[number]
-        assert isinstance(table, ObjectiveInputMotionTable)
-        unit = joint_unit(model, table.joint)
+    around = surroundings_of(scene, model)
+    for number, table in enumerate(scene.objectives, start=1):
+        if not isinstance(table, ObjectiveInputMotionTable):
+            continue
+        motion, unit = table.reference(around), joint_unit(model, table.joint)
         needed = max(float(np.linalg.norm(motion.velocity(at))) for at in times) / unit
         for place, control in enumerate(scene.control, start=1):
             fastest = share * control.strength
             if table.joint in control.joints and needed > fastest * (1.0 + 1e-9):
                 rate = "m/s" if joint_kind(model, table.joint) == SLIDE else "degrees/s"
                 yield (
-                    f"[[objectives]] {number + 1}: '{table.joint}' is to be close to a motion of "
+                    f"[[objectives]] {number}: '{table.joint}' is to be close to a motion of "
                     f"up to {needed:.3g} {rate}, and goes at {fastest:.3g} at most; a strength of "
                     f"{rounded_up(needed / share)} in [[control]] {place}"
                     + (" or a larger frequency of its servo" if share < 1.0 else "")

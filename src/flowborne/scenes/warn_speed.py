@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,8 +14,7 @@ from flowborne.coupling.world import Setup
 from flowborne.fluid.grid import Array
 from flowborne.fluid.transport import EXTRAPOLATION_COURANT
 from flowborne.motion.tracks import SPEED_SAMPLES
-from flowborne.scenes.bodies import initial_state
-from flowborne.scenes.holding import driven_dofs
+from flowborne.scenes.bodies import driven_dofs, initial_state
 from flowborne.scenes.schema import Scene
 from flowborne.solids.model import joint_unit
 from flowborne.solids.surfaces import Outline
@@ -36,15 +34,8 @@ FASTEST_TIMES = 20
 """Number of the SPEED_SAMPLES times at which all bodies are posed; each takes ms with flesh."""
 
 
-@dataclass(frozen=True)
-class Crossing:
-    """Number of cells that something crosses in a step, at most.
-
-    who  name of what crosses them
-    """
-
-    who: str
-    cells: float
+Crossing = tuple[str, float]
+"""Name of what crosses cells in a step, and how many at most."""
 
 
 def fast_bodies(scene: Scene, setup: Setup) -> Iterator[str]:
@@ -72,19 +63,19 @@ def fast_flow(scene: Scene, setup: Setup) -> Iterator[str]:
     h = setup.fluid.grid.spacing
     speeds = [*_streams(scene), *((m.name, _jet(m, scene)) for m in setup.mouths)]
     who, speed = max(speeds, key=lambda each: each[1])
-    yield from _said(scene, lambda dt: Crossing(who, speed * dt / h), FLOW_CELLS)
+    yield from _said(scene, lambda dt: (who, speed * dt / h), FLOW_CELLS)
 
 
 def _said(scene: Scene, crossing: Callable[[float], Crossing], most: float) -> Iterator[str]:
     """The warning if more than `most` cells are crossed in a step, with a sufficient number."""
-    count, found = _enough(scene, crossing, most)
+    count, (who, cells) = _enough(scene, crossing, most)
     if count == scene.time.steps_per_frame:
         return
     if count <= MOST_STEPS:
         remedy = f"time.steps_per_frame = {count} makes it one at most"
     else:
-        remedy = f"as slow as {1.0 / found.cells:.2g} of that it crosses one"
-    yield f"[time]: {found.who} crosses up to {found.cells:.3g} cells in one step; {remedy}"
+        remedy = f"as slow as {1.0 / cells:.2g} of that it crosses one"
+    yield f"[time]: {who} crosses up to {cells:.3g} cells in one step; {remedy}"
 
 
 def _enough(
@@ -97,12 +88,12 @@ def _enough(
     """
     count = scene.time.steps_per_frame
     found = crossing(scene.frame_time / count)
-    if not found.cells > most * (1.0 + 1e-9):
+    left = found[1]
+    if not left > most * (1.0 + 1e-9):
         return count, found
-    left = found.cells
     while left > AFTER_CELLS * (1.0 + 1e-9) and count <= MOST_STEPS:
         count = max(count + 1, math.ceil(min(count * left / AFTER_CELLS, MOST_STEPS + 1)))
-        left = crossing(scene.frame_time / count).cells
+        left = crossing(scene.frame_time / count)[1]
     return count, found
 
 
@@ -115,7 +106,8 @@ def _fastest_body(scene: Scene, setup: Setup, dt: float) -> Crossing:
     assert setup.fluid is not None
     model, h = setup.solid, setup.fluid.grid.spacing
     outline, axes = Outline(model), list(setup.fluid.grid.axes)
-    state, floating = initial_state(scene, model), _floating(scene, setup)
+    state, driven = initial_state(scene, model), driven_dofs(scene, model, setup.motions)
+    floating = np.unique(model.dof_root[~driven & (model.dof_body == model.dof_root)])
 
     def moved(start: Array, end: Array, recoils: bool) -> Crossing:
         places = outline.at(start)
@@ -126,19 +118,12 @@ def _fastest_body(scene: Scene, setup: Setup, dt: float) -> Crossing:
                 way[of] -= rigid_part(places[of], way[of], outline.mass[of])
         cells = np.linalg.norm(way[:, axes], axis=1) / h
         place = int(np.argmax(cells))
-        return Crossing(model.body_names[outline.body[place]], float(cells[place]))
+        return model.body_names[outline.body[place]], float(cells[place])
 
     with np.errstate(all="ignore"):
         found = [moved(state.q, model.integrate(state.q, state.v, dt), False)]
         found += [moved(*ends, True) for ends in _driven_moves(scene, setup, state.q, dt)]
-    return max(found, key=lambda crossing: crossing.cells)
-
-
-def _floating(scene: Scene, setup: Setup) -> list[int]:
-    """Children of the world with a free dof on the world."""
-    model = setup.solid
-    free = ~driven_dofs(scene, model, setup.motions) & (model.dof_body == model.dof_root)
-    return [int(root) for root in np.unique(model.dof_root[free])]
+    return max(found, key=lambda crossing: crossing[1])
 
 
 def rigid_part(places: Array, way: Array, mass: Array) -> Array:

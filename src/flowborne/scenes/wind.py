@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field
 
+from flowborne.base.errors import PartError
 from flowborne.base.tables import (
     FUNCTION,
     ByKind,
@@ -20,8 +21,7 @@ from flowborne.base.tables import (
     Vector,
     triple,
 )
-from flowborne.control.python_function import WindFunction, with_parameters
-from flowborne.control.surroundings import Surroundings
+from flowborne.control.surroundings import Surroundings, with_parameters
 from flowborne.coupling.stream import WindStream
 from flowborne.fluid.grid import Array
 from flowborne.motion.inflow import Factor, FactorSteady
@@ -45,6 +45,36 @@ class Gusts:
         """(n, 3) velocity in m/s at the places x (n, 3)."""
         share = np.maximum(x[:, 2] / self.height, 0.0) ** self.exponent
         return self.factor.at(time) * share[:, None] * np.array(self.velocity)
+
+
+@dataclass(frozen=True)
+class WindFunction:
+    """A wind by a function of the user's own; see `WindField`.
+
+    function  (x (n, 3) in m, time in s) -> (n, 3) m/s
+    name      for messages
+    """
+
+    function: Callable[..., Any]
+    name: str
+
+    def __call__(self, x: Array, time: float) -> Array:
+        """(n, 3) velocity in m/s at the places x (n, 3). Raises PartError when it is not that."""
+        with PartError.guarding(f"wind '{self.name}'"):
+            given = self.function(x, time)
+        try:
+            velocity = np.asarray(given, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise PartError(
+                f"wind '{self.name}' gave a {type(given).__name__} that is no array of numbers: "
+                "return velocities, a row (3,) for each place"
+            ) from None
+        if velocity.shape not in ((3,), x.shape) or not np.isfinite(velocity).all():
+            raise PartError(
+                f"wind '{self.name}' gave an array of shape {velocity.shape}, or numbers that are "
+                f"not finite, for {len(x)} places: return finite velocities, a row (3,) for each"
+            )
+        return np.broadcast_to(velocity, x.shape)
 
 
 class AnyWindTable(Table):

@@ -57,36 +57,25 @@ class Finding:
         return f"{state:<8}  {self.what:<12}  {found}"
 
 
-@dataclass(frozen=True)
-class Check:
-    """A check of one part of the machine.
-
-    look    returns `found`; raises an error that describes a fault
-    remedy  what to do about a fault
-    """
-
-    what: str
-    look: Callable[[], str]
-    remedy: str
-    needed: bool = True
-
-    def finding(self) -> Finding:
-        try:
-            return Finding(self.what, self.look(), needed=self.needed)
-        except Exception as error:  # any error is a finding
-            said = " ".join(str(error).split()) or type(error).__name__
-            return Finding(self.what, said, self.remedy, self.needed)
-
-
 def findings() -> Iterator[Finding]:
     """The result of each check, as soon as it is known."""
-    for check in CHECKS:
-        yield check.finding()
+    for what in CHECKS:
+        yield finding(what)
     for extra, required in sorted(extras().items()):
         lacking = [said for each in required if (said := lack(each))]
         remedy = f"pip install 'flowborne[{extra}]'" if lacking else ""
-        found = ", ".join(lacking or map(installed, required))
+        found = ", ".join(lacking or (f"{each.name} {version(each.name)}" for each in required))
         yield Finding(f"[{extra}]", found, remedy, needed=False)
+
+
+def finding(what: str) -> Finding:
+    """The result of one of CHECKS; any error is one."""
+    look, remedy, needed = CHECKS[what]
+    try:
+        return Finding(what, look(), needed=needed)
+    except Exception as error:
+        said = " ".join(str(error).split()) or type(error).__name__
+        return Finding(what, said, remedy, needed)
 
 
 def versions_here() -> str:
@@ -132,10 +121,10 @@ def threads() -> str:
 
 def memory() -> str:
     """Size of the machine's memory, if the system reports it."""
-    if "SC_PHYS_PAGES" not in getattr(os, "sysconf_names", {}):
-        return "not reported by this system"
-    size = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    return f"{size / 1e9:.1f} GB"
+    from flowborne.runs.summary import machine_memory
+
+    size = machine_memory()
+    return "not reported by this system" if size is None else f"{size / 1e9:.1f} GB"
 
 
 def films() -> str:
@@ -228,32 +217,22 @@ def lack(requirement: Requirement) -> str:
     return f"{requirement.name} {number} is not {requirement.specifier}"
 
 
-def installed(requirement: Requirement) -> str:
-    """Name and version of a library."""
-    return f"{requirement.name} {version(requirement.name)}"
-
-
-CHECKS = (
-    Check("versions", versions_here, "install flowborne again with pip install flowborne"),
-    Check("libraries", libraries, "install them with pip install flowborne"),
-    Check(
-        "kernels",
+CHECKS: dict[str, tuple[Callable[[], str], str, bool]] = {
+    "versions": (versions_here, "install flowborne again with pip install flowborne", True),
+    "libraries": (libraries, "install them with pip install flowborne", True),
+    "kernels": (
         kernels,
         "let NUMBA_CACHE_DIR name a folder that can be written, or install numba again",
+        True,
     ),
-    Check(
-        "threads",
+    "threads": (
         threads,
         "install TBB with pip install tbb, or OpenMP (on Debian and Ubuntu libgomp1)",
-        needed=False,
+        False,
     ),
-    Check("memory", memory, "", needed=False),
-    Check(
-        "films",
-        films,
-        "install it with pip install 'flowborne[film]'; runs go without film",
-        needed=False,
-    ),
-    Check("OpenGL", opengl, REMEDY, needed=False),
-)
-"""The checks, in order."""
+    "memory": (memory, "", False),
+    "films": (films, "install it with pip install 'flowborne[film]'; runs go without film", False),
+    "OpenGL": (opengl, REMEDY, False),
+}
+"""Part of the machine -> function that returns its state or raises an error that describes a fault,
+what to do about a fault, and whether a run needs the part."""

@@ -6,7 +6,7 @@ import logging
 import signal
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
+from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, dataclass
 from enum import Enum
 from math import prod
@@ -31,7 +31,7 @@ from flowborne.runs.summary import doubts_of, peak_memory, summarise, versions
 from flowborne.scenes.creature import creature_of
 from flowborne.scenes.earlier import earlier_joints
 from flowborne.scenes.notes import notes_of
-from flowborne.scenes.scene_copy import scene_to_resume, with_frames, write_scene
+from flowborne.scenes.save import scene_to_resume, with_frames, write_scene
 from flowborne.scenes.seen import seen_bodies
 from flowborne.scenes.warn import warnings_of
 from flowborne.sim.simulation import BlowUpError, Simulation, Snapshot
@@ -137,7 +137,10 @@ def run(
                 files = scene_files(wanted)
                 simulation = open_until_the_end.enter_context(Simulation(wanted, workers=workers))
                 job = _Run(simulation, folder, files, signals, progress)
-                open_until_the_end.enter_context(job.watching_compilation())
+                if wanted.has_fluid:
+                    open_until_the_end.enter_context(
+                        compilation_watched(lambda kernels: job.show("compiling", kernels=kernels))
+                    )
                 if not resume:
                     _ = simulation.world  # starts bodies and fluid, which may take long
         except KeyboardInterrupt as stop:
@@ -163,9 +166,8 @@ class _Run:
         self.simulation = simulation
         self.folder = folder
         self.files = files
-        self.checkpoint_every = simulation.scene.output.checkpoint_every
         self.frames = simulation.frames
-        self.taken = earlier_joints(simulation.scene)
+        self.taken = earlier_joints(simulation.scene)  # the run may take the earlier one's place
         self.warnings = warnings_of(simulation.scene, simulation.setup)
         self.columns = (*simulation.columns.names, *(f"seconds_{p}" for p in ("total", *PARTS)))
         self.recorder = Recorder(folder)
@@ -217,7 +219,7 @@ class _Run:
     def go_on(self) -> tuple[RunOutcome, str]:
         """Advance and record to the last frame, or until the run stops; outcome and message."""
         simulation, signals = self.simulation, self._signals
-        self._show("start")
+        self.show("start")
         while simulation.frame < self.frames and not signals.asked:
             try:
                 with signals.interruptible():
@@ -233,7 +235,7 @@ class _Run:
             except OSError as error:
                 return RunOutcome.NOT_WRITTEN, self._not_written(error)
             joints = tuple((c, values[c]) for c in simulation.columns.controlled)
-            self._show("frame", objective=report.objective, joints=joints)
+            self.show("frame", objective=report.objective, joints=joints)
         try:
             self._save()
         except OSError as error:
@@ -278,7 +280,10 @@ class _Run:
 
         try:
             with self._signals.interruptible():
-                make_preview(self.folder.path, self._show_drawn)
+                make_preview(
+                    self.folder.path,
+                    lambda drawn, frames: self.show("film", frame=drawn, frames=frames),
+                )
         except (RunFolderError, ValueError) as error:
             return f"; no film: {error}"
         except KeyboardInterrupt:
@@ -305,12 +310,6 @@ class _Run:
                 failed += f"; stopped before {table.file} was written; write it with: {how}"
         return exported, failed
 
-    def watching_compilation(self) -> AbstractContextManager[None]:
-        """Context that shows the progress of compiling kernels."""
-        if not self.simulation.scene.has_fluid:
-            return nullcontext()
-        return compilation_watched(lambda kernels: self._show("compiling", kernels=kernels))
-
     def _write_start(self) -> None:
         """Write all files of frame 0, the checkpoint last."""
         simulation, folder = self.simulation, self.folder
@@ -333,7 +332,7 @@ class _Run:
         except BaseException:
             self.history.drop_last(length)
             raise
-        if report.frame % self.checkpoint_every == 0:
+        if report.frame % simulation.scene.output.checkpoint_every == 0:
             self._save()
         return values
 
@@ -429,10 +428,7 @@ class _Run:
         path = self.folder.path
         return f"continue with: flowborne run {self.folder.scene} --out {path} --resume"
 
-    def _show_drawn(self, drawn: int, frames: int) -> None:
-        self._show("film", frame=drawn, frames=frames)
-
-    def _show(self, stage: Stage, **news: Any) -> None:
+    def show(self, stage: Stage, **news: Any) -> None:
         """Report progress; by default of the simulation's frame."""
         if self._progress is None:
             return

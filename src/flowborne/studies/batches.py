@@ -24,9 +24,9 @@ from flowborne.runs.history import history_columns, read_history
 from flowborne.runs.run_folder import RunFolder, RunFolderError, make_folder
 from flowborne.scenes.bodies import load_model
 from flowborne.scenes.capture import capture_of, followers
-from flowborne.scenes.controller import ControllerTable
+from flowborne.scenes.control import ControllerTable
 from flowborne.scenes.load import load_scene
-from flowborne.scenes.scene_copy import scene_to_resume, with_frames
+from flowborne.scenes.save import scene_to_resume, with_frames
 from flowborne.scenes.schema import Scene
 from flowborne.sim.running import COMPLETE, run
 from flowborne.studies.batch_page import PAGE, Batch, ClipRun, is_own_page, write_page
