@@ -106,14 +106,16 @@ class StudyResult:
         raises  ValueError for another column or format; SceneError if Matplotlib is not installed
         """
         optional("matplotlib", "Matplotlib", "film", "plots", "drawn")
-        from flowborne.view.plots import Points, plot_points
+        from flowborne.view.plots import plot_points
 
-        axes = [self._axis(name) for name in (x, y)]
+        points = self._axis(x), self._axis(y)
         front = self.front() if self.goals and {x, y} <= set(self.goals) else np.array([], int)
         finest = np.flatnonzero(self.columns["finest"])
-        bars = [self.columns.get(f"{name}{BAR}") for name in (x, y)]
-        points = Points(*axes, *(None if bar is None else bar[finest] for bar in bars))
-        plot_points(points, (self.label(x), self.label(y)), np.searchsorted(finest, front), path)
+        bar_columns = (self.columns.get(f"{name}{BAR}") for name in (x, y))
+        x_bar, y_bar = (None if bar is None else bar[finest] for bar in bar_columns)
+        labels = self.label(x), self.label(y)
+        best = np.searchsorted(finest, front)
+        plot_points(*points, (x_bar, y_bar), labels, best, path)
 
     def _axis(self, name: str) -> Array:
         if name not in self.columns or self.columns[name].dtype.kind not in "fiub":

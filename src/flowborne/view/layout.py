@@ -119,11 +119,6 @@ class Layout:
         inches = ((round(width) + 0.01) / dots, (round(height) + 0.01) / dots)
         return Figure(figsize=inches, dpi=dots)
 
-    @property
-    def pixels(self) -> tuple[int, int]:
-        """Width and height of the picture."""
-        return round(self.width * self.scale), round(self.height * self.scale)
-
     def axes(self, figure: Figure, box: Box) -> Axes:
         """New axes at `box`."""
         bottom = self.height - box.top - box.height

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -15,7 +15,7 @@ from PIL import Image
 
 from flowborne.kernels.arrays import Array
 from flowborne.view import style
-from flowborne.view.fields import Legend, Scale, faded, field_of, over
+from flowborne.view.fields import FieldVortices, Legend, Scale, faded, field_of, over
 from flowborne.view.framing import windows
 from flowborne.view.glyphs import SHAFT_WIDTH, Forces, arrow, camera_moves, crosses
 from flowborne.view.outlines import Outlines, flesh_loops
@@ -23,7 +23,6 @@ from flowborne.view.run import Run, State
 from flowborne.view.shot import Shot
 from flowborne.view.space.camera import camera_of
 from flowborne.view.space.opengl import off_screen
-from flowborne.view.space.visible import visible_of
 
 if TYPE_CHECKING:
     from flowborne.view.space.stage import Stage
@@ -33,33 +32,6 @@ ROUNDING = 1e-6
 
 WIND_ROWS = 9
 """Rows of arrows that show a wind, along the map's smaller side."""
-
-
-class Map(Protocol):
-    """The part of a picture that shows the run itself.
-
-    width   m across the map, at the bodies
-    aspect  height over width
-    forces  the scale of the arrows of forces
-    """
-
-    width: float
-    aspect: float
-    forces: Forces
-    legend: Legend
-    scale: Scale | None
-
-    def draw_on(self, axes: Axes, pixels: int) -> Sequence[Artist]:
-        """Draw what is fixed in `axes`, `pixels` wide at scale 1; returns the moving artists."""
-        ...
-
-    def show(self, number: int, state: State) -> None:
-        """Update the moving artists to the `number`-th state."""
-        ...
-
-    def close(self) -> None:
-        """Release all resources besides memory; nothing can be drawn afterwards."""
-        ...
 
 
 class MapImage(Artist):
@@ -135,7 +107,10 @@ class MapImage(Artist):
 class MapSlab:
     """Map of a slab from above: its fluid, its bodies and the forces on them.
 
-    views  (frames, 4) m, (x0, x1, y0, y1) of each frame
+    views   (frames, 4) m, (x0, x1, y0, y1) of each frame
+    width   m across the map
+    aspect  height over width
+    forces  the scale of the arrows of forces
     """
 
     def __init__(self, run: Run, shot: Shot, aspect: float | None = None) -> None:
@@ -143,7 +118,9 @@ class MapSlab:
         self.run = run
         self._shot = shot
         self._shown = [n for n, geom in enumerate(run.geoms) if shot.bones or not geom.covered]
-        self._field = field_of(run, shot)
+        field = field_of(run, shot)
+        assert not isinstance(field, FieldVortices)
+        self._field = field
         self._outlines = Outlines(run)
         self.views = windows(run, self._outlines, shot, aspect)
         x0, x1, y0, y1 = self.views[0]
@@ -156,7 +133,7 @@ class MapSlab:
         self.scale = None if self._field is None else self._field.scale
 
     def draw_on(self, axes: Axes, pixels: int) -> Sequence[Artist]:
-        """Draw what is fixed in `axes`, `pixels` wide; returns the moving artists."""
+        """Draw what is fixed in `axes`, `pixels` wide at scale 1; returns the moving artists."""
         self._pixel = self.width / pixels
         self._axes = axes
         self._look(0)
@@ -165,7 +142,7 @@ class MapSlab:
         if self._field is not None:
             self._water = MapImage(axes)
             moving.append(self._water)
-        elif self.run.wind.any():
+        elif self.run.grid is None and self.run.wind.any():
             axes.add_collection(self._wind)
             moving.append(self._wind)
         self._marks: LineCollection | None = None
@@ -201,7 +178,7 @@ class MapSlab:
             (x0, y0, _), (x1, y1, _) = grid.origin, grid.upper
             self._water.image = image if self._shot.transparent else over(image, self._shot.colour)
             self._water.extent = (x0, x1, y0, y1)
-        elif self.run.wind.any():
+        elif self.run.grid is None and self.run.wind.any():
             corner, wind = self.views[0, [0, 2]], self.run.wind.sum(axis=0)[:2]
             self._wind.set_verts(wind_arrows(self.views[number], corner, wind))
         if self._marks is not None:
@@ -269,6 +246,9 @@ class MapSpace:
     """Map of space, drawn by VTK.
 
     camera  of all frames
+    width   m across the map, at the bodies
+    aspect  height over width
+    forces  the scale of the arrows of forces
     """
 
     def __init__(self, run: Run, shot: Shot, aspect: float | None = None) -> None:
@@ -278,9 +258,9 @@ class MapSpace:
         self.camera = camera_of(run, shot, aspect)
         self.width, self.aspect = self.camera.width, self.camera.aspect
         self.forces = Forces(run, min(self.camera.width, self.camera.height))
-        self._visible = visible_of(run, shot)
-        self.legend: Legend = () if self._visible is None else self._visible.legend
-        self.scale: Scale | None = None if self._visible is None else self._visible.scale
+        self._field = field_of(run, shot)
+        self.legend: Legend = () if self._field is None else self._field.legend
+        self.scale: Scale | None = None if self._field is None else self._field.scale
         self._stage: Stage | None = None
 
     def draw_on(self, axes: Axes, pixels: int) -> Sequence[Artist]:
@@ -295,7 +275,7 @@ class MapSpace:
 
         pixel = self.width / pixels
         self._stage = Stage(
-            plotter, self.run, self.camera, self.forces, self._visible, pixel, self._shot
+            plotter, self.run, self.camera, self.forces, self._field, pixel, self._shot
         )
         return [self._image]
 

@@ -19,7 +19,7 @@ from flowborne.kernels.arrays import Array
 from flowborne.view import style
 from flowborne.view.glyphs import SHAFT_WIDTH, arrow, round_number
 from flowborne.view.layout import MARGIN, Box, Layout
-from flowborne.view.maps import Map, MapSlab, MapSpace
+from flowborne.view.maps import MapSlab, MapSpace
 from flowborne.view.plots import LETTERS_IN_LEGEND, Strip, joint_curves, shortened, strip_curves
 from flowborne.view.run import Run
 from flowborne.view.shot import Shot
@@ -58,7 +58,7 @@ class Picture:
         if shot.size is not None:
             self.layout = Layout.sized(shot.size, len(curves), bare=not shot.plots)
             box = self.layout.map
-            self.map: Map = kind(run, shot, box.height / box.width)
+            self.map: MapSlab | MapSpace = kind(run, shot, box.height / box.width)
         else:
             self.map = kind(run, shot)
             aspect = self.map.aspect

@@ -11,14 +11,13 @@ from numpy.testing import assert_allclose
 
 from flowborne.fluid.grid import Grid
 from flowborne.view import style
-from flowborne.view.fields import side_weight
+from flowborne.view.fields import FieldDye, FieldVortices, side_weight
 from flowborne.view.maps import MapSpace
 from flowborne.view.pictures import Picture
 from flowborne.view.run import Run
 from flowborne.view.shot import CameraShot, Shot
 from flowborne.view.space.camera import FILLED_BY_FLUID, Camera, camera_of
 from flowborne.view.space.surroundings import water_of
-from flowborne.view.space.visible import VisibleDye, VisibleVortices
 
 from .projecting import project
 from .test_map_space import drawn, of_hue, pixel_of
@@ -109,8 +108,8 @@ def test_dye_and_vortices_end_softly_at_the_sides(run: Run, box_of_fluid: Grid) 
     with_dye(run, state["scalar_dye"])
     run.sampled = lambda most: [state]  # type: ignore[method-assign]
     weight = side_weight(box_of_fluid.shape, (0, 1, 2))
-    assert_allclose(VisibleVortices(run).q(state), 4.0 * weight, rtol=1e-4)
-    smoke = VisibleDye(run).smoke(state)[1]
+    assert_allclose(FieldVortices(run).q(state), 4.0 * weight, rtol=1e-4)
+    smoke = FieldDye(run).smoke(state)[1]
     assert_allclose(smoke, weight, rtol=1e-5)
 
 

@@ -7,13 +7,14 @@ import pyvista as pv
 
 from flowborne.fluid.grid import Array, Grid
 from flowborne.view import style
+from flowborne.view.fields import Field, FieldDye, FieldNumber, FieldVortices
 from flowborne.view.glyphs import SHAFT_WIDTH, Forces, camera_moves
 from flowborne.view.paths import through_window, window_path
 from flowborne.view.run import Geom, Run, State
 from flowborne.view.shot import Shot
 from flowborne.view.space.arrows import Arrows, WindArrows
 from flowborne.view.space.camera import Camera
-from flowborne.view.space.fluid import fluid_in
+from flowborne.view.space.fluid import Slice, Smoke, Vortices
 from flowborne.view.space.lighting import KEY, LIGHTS
 from flowborne.view.space.surfaces import (
     LIT,
@@ -24,7 +25,6 @@ from flowborne.view.space.surfaces import (
     mesh_of,
 )
 from flowborne.view.space.surroundings import Ground, Motes, stands_on_ground, water_of
-from flowborne.view.space.visible import Visible
 from flowborne.view.style import Pixels
 
 MULTI_SAMPLES = 8
@@ -34,9 +34,9 @@ MULTI_SAMPLES = 8
 class Stage:
     """Scene of a run in a plotter, which it owns from then on.
 
-    visible  quantity of the fluid, if any
-    pixel    m, size of a pixel of the film
-    shot     background, and whether flesh is transparent to show its bones
+    field  of the fluid, if one is shown
+    pixel  m, size of a pixel of the film
+    shot   background, and whether flesh is transparent to show its bones
     """
 
     def __init__(
@@ -45,7 +45,7 @@ class Stage:
         run: Run,
         camera: Camera,
         forces: Forces,
-        visible: Visible | None,
+        field: Field | None,
         pixel: float,
         shot: Shot,
     ) -> None:
@@ -77,10 +77,15 @@ class Stage:
             self._edges, self._path = _edges(plotter, run.grid), window_path(run)
         elif run.wind.any():
             self._wind = WindArrows(plotter, run, camera, 0.0 if self._ground else -np.inf)
-        self._fluid = None
-        if run.grid is not None and visible is not None:
-            self._fluid = fluid_in(plotter, run.grid, visible, camera)
+        self._fluid: Smoke | Vortices | Slice | None = None
+        if run.grid is not None and field is not None:
             self._through = through_window(run, camera.focus)
+            if isinstance(field, FieldDye):
+                self._fluid = Smoke(plotter, run.grid, field, camera.height)
+            elif isinstance(field, FieldNumber):
+                self._fluid = Slice(plotter, run.grid, field, camera.axes(0)[2])
+            elif isinstance(field, FieldVortices):
+                self._fluid = Vortices(plotter, field)
 
     def image(self, number: int, state: State) -> Pixels:
         """(height, width, 3 or 4) picture of the `number`-th state, lowest row first."""
