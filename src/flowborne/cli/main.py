@@ -374,7 +374,7 @@ def film(
     from flowborne.view.film import make_preview, write_shot
     from flowborne.view.shot import Shot
 
-    shot = Shot.of(film_settings(files, _overrides(settings)))
+    shot = Shot.model_validate(film_settings(files, _overrides(settings)))
     drawn = f"{files.picture}, {files.film}"
     began = perf_counter()
     with _writing(folder if out is None else out, ValueError), ProgressDisplay() as display:

@@ -18,10 +18,10 @@ from flowborne.runs.run_folder import LOCK_NAME, RunFolderError, check_name, mak
 from flowborne.scenes.load import load_scene
 from flowborne.sim.simulation import Simulation
 from flowborne.studies.members import Members, member_id, scene_digest
-from flowborne.studies.optimising import Optimiser
 from flowborne.studies.page import write_page
 from flowborne.studies.result import Row, StudyResult, measures_of, table_of, values_of
 from flowborne.studies.sampling import (
+    Optimiser,
     Sample,
     count_samples,
     is_optimisation,

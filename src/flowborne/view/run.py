@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sized
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -43,24 +43,6 @@ class Geom:
     covered: bool = False
 
 
-class Skin(Protocol):
-    """A surface that deforms from frame to frame.
-
-    triangles  (m, 3) vertices of each, outward
-    rgb        (3,) colour
-    """
-
-    @property
-    def triangles(self) -> NDArray[np.int64]: ...
-
-    @property
-    def rgb(self) -> Array: ...
-
-    def vertices(self, state: State) -> Array:
-        """(k, 3) m, in a state."""
-        ...
-
-
 @dataclass(frozen=True)
 class Flesh:
     """The skin of all flesh; its vertices are the `flesh_vertices` (k, 3) of a state.
@@ -72,9 +54,7 @@ class Flesh:
     triangles: NDArray[np.int64]
     bodies: tuple[int, ...]
 
-    @property
-    def rgb(self) -> Array:
-        return style.rgb(style.FLESH)
+    rgb = style.rgb(style.FLESH)
 
     def vertices(self, state: State) -> Array:
         """(k, 3) m, in a state."""
@@ -110,6 +90,10 @@ class CarriedSkin:
         return skinned(self.rest, self.weights, R, t)
 
 
+Skin = Flesh | CarriedSkin
+"""A surface that deforms from frame to frame."""
+
+
 class Run(OpenRun):
     """A run opened for drawing; `history` has only the columns that are plotted.
 
@@ -143,7 +127,7 @@ class Run(OpenRun):
                 self.flesh = Flesh(self.skin, tuple(model["flesh"]["bodies"]))
             self.carried = tuple(_carried(entry) for entry in model.get("skins", ()))
             self.sources = _sources(scene)
-            self.shot = Shot.of(scene.get("film", {}))
+            self.shot = Shot.model_validate(scene.get("film", {}))
             self.history = _plotted(RunFolder(self.folder).history)
             numbers = [*body_of.values(), *(geom.body for geom in self.geoms)]
             numbers += [body for skin in self.carried for body in skin.bodies]

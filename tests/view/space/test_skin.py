@@ -213,7 +213,7 @@ def test_bones_are_hidden_until_they_are_asked_for(arm: Path) -> None:
     assert [geom.covered for geom in run.geoms] == [True, True]
     with (
         closing(Picture(run)) as picture,
-        closing(Picture(run, shot=replace(run.shot, bones=True))) as inside,
+        closing(Picture(run, shot=run.shot.model_copy(update={"bones": True}))) as inside,
     ):
         at = pixel_of(picture, 2, lower)
         skin, bone = drawn(picture, 2)[at], drawn(inside, 2)[at]

@@ -67,7 +67,7 @@ def test_dye_has_its_colour_and_is_as_dense_as_there_is_of_it(box_of_fluid: Grid
     ink[:6], milk[:, :5] = 2.0, 0.5
     ink[0, 0, 0], milk[0, 0, 0] = np.nan, np.nan
     state = {"open": np.ones_like(ink), "scalar_ink": ink, "scalar_milk": milk}
-    seen = field_of(shown(box_of_fluid, state), Shot("dye"))
+    seen = field_of(shown(box_of_fluid, state), Shot(field="dye"))
     assert isinstance(seen, FieldDye)
     assert seen.legend == [("ink", style.DYES[0]), ("milk", style.DYES[1])]
     colour, density = seen.smoke(state)
@@ -84,7 +84,7 @@ def test_dye_has_its_colour_and_is_as_dense_as_there_is_of_it(box_of_fluid: Grid
 
 def test_a_slice_shows_the_layer_where_it_is(box_of_fluid: Grid) -> None:
     state = turning(box_of_fluid, np.array([0.0, 0.0, 2.0]))
-    seen = field_of(shown(box_of_fluid, state), Shot("speed"))
+    seen = field_of(shown(box_of_fluid, state), Shot(field="speed"))
     assert isinstance(seen, FieldNumber)
     assert seen.scale is not None
     assert seen.scale[3] == "speed (m/s)"
@@ -97,6 +97,6 @@ def test_a_slice_shows_the_layer_where_it_is(box_of_fluid: Grid) -> None:
 
 def test_nothing_is_seen_where_nothing_is_wanted_and_no_dye_is_said(box_of_fluid: Grid) -> None:
     state = turning(box_of_fluid, TOWARD)
-    assert field_of(shown(box_of_fluid, state), Shot("none")) is None
+    assert field_of(shown(box_of_fluid, state), Shot(field="none")) is None
     with pytest.raises(ValueError, match="the run has no dye to show"):
-        field_of(shown(box_of_fluid, state), Shot("dye"))
+        field_of(shown(box_of_fluid, state), Shot(field="dye"))

@@ -10,12 +10,13 @@ import pytest
 from numpy.testing import assert_allclose
 
 from flowborne.fluid.grid import Grid
+from flowborne.scenes.schema_film import CameraTable
 from flowborne.view import style
 from flowborne.view.fields import FieldDye, FieldVortices, side_weight
 from flowborne.view.maps import MapSpace
 from flowborne.view.pictures import Picture
 from flowborne.view.run import Run
-from flowborne.view.shot import CameraShot, Shot
+from flowborne.view.shot import Shot
 from flowborne.view.space.camera import FILLED_BY_FLUID, Camera, camera_of
 from flowborne.view.space.surroundings import water_of
 
@@ -51,7 +52,7 @@ def followed(run_of: Make, box_of_fluid: Grid, ball: tuple[str, tuple[float, ...
 
 
 def camera(run: Run, follow: str) -> Camera:
-    return camera_of(run, Shot(field="none", camera=CameraShot(follow=follow)))
+    return camera_of(run, Shot(field="none", camera=CameraTable(follow=follow)))
 
 
 def corners_of(run: Run, number: int) -> np.ndarray:
@@ -88,7 +89,7 @@ def test_dye_glows_where_it_is_and_the_box_is_around_it(
     dye = np.zeros(box_of_fluid.shape, np.float32)
     dye[8:11, 3:7, 4:7] = 1.0
     with_dye(run, dye)
-    run.shot = Shot("dye", camera=CameraShot(follow=follow, distance=12.0))
+    run.shot = Shot(field="dye", camera=CameraTable(follow=follow, distance=12.0))
     with closing(Picture(run)) as picture:
         assert isinstance(picture.map, MapSpace)
         for number in (0, 40):

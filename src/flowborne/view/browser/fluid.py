@@ -258,7 +258,7 @@ class Fluid:
 
     def _field(self, name: str) -> Field | None:
         if name not in self._fields:
-            self._fields[name] = field_of(self._run, Shot.of({"field": name}))
+            self._fields[name] = field_of(self._run, Shot.model_validate({"field": name}))
         return self._fields[name]
 
 

@@ -23,7 +23,7 @@ from flowborne.view.browser.settings import Settings, Timeline
 from flowborne.view.browser.solids import Bodies, ForceArrows, SkinMesh
 from flowborne.view.browser.surroundings import Surroundings
 from flowborne.view.browser.viewpoint import CameraKeys, FilmView
-from flowborne.view.paths import window_path
+from flowborne.view.framing import window_path
 from flowborne.view.run import Run, State
 
 if TYPE_CHECKING:

@@ -8,8 +8,8 @@ import pyvista as pv
 from flowborne.fluid.grid import Array, Grid
 from flowborne.view import style
 from flowborne.view.fields import Field, FieldDye, FieldNumber, FieldVortices
+from flowborne.view.framing import through_window, window_path
 from flowborne.view.glyphs import SHAFT_WIDTH, Forces, camera_moves
-from flowborne.view.paths import through_window, window_path
 from flowborne.view.run import Geom, Run, State
 from flowborne.view.shot import Shot
 from flowborne.view.space.arrows import Arrows, WindArrows
