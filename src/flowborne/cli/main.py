@@ -295,7 +295,7 @@ def study(
     See docs/studies.md.
     """
     from flowborne.base.progress import ProgressDisplay
-    from flowborne.studies.running import Plan, run_plan
+    from flowborne.studies.running import Plan, study
 
     plan = Plan.of(file)
     print(plan, flush=True)
@@ -303,7 +303,7 @@ def study(
         return
     with ProgressDisplay() as progress:
         try:
-            result = run_plan(plan, out, workers=workers, dask=dask, retry=retry, progress=progress)
+            result = study(plan, out, workers=workers, dask=dask, retry=retry, progress=progress)
         except KeyboardInterrupt as stop:
             raise StoppedError("interrupted; the same command continues the study") from stop
     for pair in plot or ():

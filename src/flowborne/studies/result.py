@@ -201,7 +201,7 @@ def table_of(
     for key in study.keys:
         columns[key] = _column([row.settings[key] for row in rows])
     columns["outcome"] = np.array([row.ended.outcome for row in rows], object)
-    columns["cells"] = np.array([math.nan if c is None else c for c in _cells(rows)], float)
+    columns["cells"] = np.array([row.ended.cells for row in rows], float)
     units = {name: "" if "." in name else "1" for name in columns}
     for number, measure in enumerate(measures):
         columns[measure.name] = np.array([row.values[number] for row in rows], float)
@@ -212,10 +212,6 @@ def table_of(
     goals = {table.name: str(table.goal) for table in measures if table.goal is not None}
     failed = {row.member: row.ended.message for row in rows if not row.ended.is_complete}
     return StudyResult(folder, columns, units, goals, failed)
-
-
-def _cells(rows: Sequence[Row]) -> list[int | None]:
-    return [row.ended.cells for row in rows]
 
 
 def _column(values: list[Any]) -> Column:

@@ -15,10 +15,13 @@ import numpy as np
 
 from flowborne.base.errors import SceneError
 from flowborne.base.extras import optional
-from flowborne.studies.schema import OPTIMISERS, Study, VaryTable
+from flowborne.studies.schema import Study, VaryTable
 
 MOST_RUNS = 100_000
 """Most runs of a study; each has two files in one folder."""
+
+DIRECTIONS = {"least": "minimize", "most": "maximize"}
+"""Goal of a measure -> direction of Optuna."""
 
 Sample = dict[str, Any]
 """Dotted key of the scene -> value."""
@@ -99,14 +102,6 @@ def count_samples(study: Study) -> int:
             "Give fewer values, or a smaller count."
         )
     return samples
-
-
-def is_optimisation(study: Study) -> bool:
-    """Whether later samples depend on the results of earlier ones."""
-    return study.sample.kind in OPTIMISERS
-
-
-DIRECTIONS = {"least": "minimize", "most": "maximize"}
 
 
 class Optimiser:

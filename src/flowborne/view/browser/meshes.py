@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyvista as pv
-from vtkmodules.vtkFiltersGeneral import vtkContourTriangulator
 
 from flowborne.kernels.arrays import Array, Integers
 
@@ -87,11 +86,7 @@ def counter_clockwise(outline: Array) -> Array:
 def _inside(points: Array, loops: Sequence[Integers]) -> Integers:
     """(m, 3) triangles of points (n, 3) of a plane, inside loops of these points."""
     lines = [entry for loop in loops for entry in (len(loop) + 1, *loop.tolist(), int(loop[0]))]
-    outline = pv.PolyData(points, lines=lines)
-    cap = vtkContourTriangulator()
-    cap.SetInputData(outline)
-    cap.Update()
-    faces = pv.wrap(cap.GetOutput()).regular_faces
+    faces = pv.PolyData(points, lines=lines).triangulate_contours().regular_faces
     return np.asarray(faces, np.int64)
 
 
