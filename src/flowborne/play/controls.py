@@ -214,7 +214,6 @@ def _title(group: Group) -> str:
 
 
 def _rate(model: SolidModel, joint: str) -> str:
-    """Unit of the strength of a joint."""
     return "m/s" if joint_kind(model, joint) == SLIDE else "°/s"
 
 

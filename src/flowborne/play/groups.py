@@ -63,7 +63,6 @@ def with_choices(scene: Scene) -> tuple[Scene, tuple[Group, ...]]:
 
 
 def _wanted(scene: Scene) -> dict[str, tuple[int, ...]]:
-    """Controlled joint -> numbers of its objectives."""
     return {
         joint: tuple(
             n

@@ -44,7 +44,6 @@ class PlayPanel(Panel):
     ) -> None:
         self.asked: SimpleQueue[str] = SimpleQueue()
         self._has_ghost = run.moments[0].ghost is not None
-        self._ghost: Any = None
         self._controls_of_play = controls
         self._dials: dict[str, Any] = {}
         super().__init__(gui, run, view, timeline)
@@ -62,11 +61,6 @@ class PlayPanel(Panel):
         for name, value in settings.items():
             if self._dials[name].value != value:
                 self._dials[name].value = value
-
-    @property
-    def ghost(self) -> str:
-        """Which of GHOSTS is chosen."""
-        return "none" if self._ghost is None else str(self._ghost.value)
 
     def say(self, text: str) -> None:
         """Show a text below the buttons; Markdown."""
@@ -100,7 +94,6 @@ class PlayPanel(Panel):
         command.on_trigger(lambda _: self.asked.put(request))
 
     def _add_dials(self, gui: GuiApi) -> None:
-        """Add a control for all that can be set, in folders by the first part of its name."""
         folders: dict[str, Any] = {}
         titles = {control.name.rpartition(": ")[0] for control in self._controls_of_play.all}
         few = len(titles) <= EXPANDED
@@ -124,4 +117,6 @@ class PlayPanel(Panel):
             walks = run.grid is None and not run.is_slab
             self._controls["follow"] = gui.add_checkbox("follow", walks)
         if self._has_ghost:
-            self._ghost = gui.add_dropdown("input motion", list(GHOSTS), initial_value="none")
+            self._controls["ghost"] = gui.add_dropdown(
+                "input motion", list(GHOSTS), initial_value="none"
+            )

@@ -270,6 +270,5 @@ def _check(resolutions: Sequence[float], values: Sequence[float]) -> None:
 
 
 def _check_growing(name: str, numbers: Sequence[float]) -> None:
-    """Raise ValueError unless they are positive, and each is larger than the one before."""
     if not (numbers[0] > 0 and np.isfinite(numbers).all() and np.all(np.diff(numbers) > 0)):
         raise ValueError(f"{name} are {list(numbers)}. Give positive numbers, from small to large.")

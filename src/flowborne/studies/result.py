@@ -215,7 +215,6 @@ def table_of(
 
 
 def _column(values: list[Any]) -> Column:
-    """Values of a key: numbers, truth values or texts as they are, others as TOML."""
     if all(isinstance(value, int | float) for value in values):
         return np.array(values)
     return np.array([v if isinstance(v, str) else toml_text(v) for v in values], object)

@@ -286,7 +286,6 @@ def _pressure(state: State) -> Array:
 
 
 def _in_fluid(state: State) -> NDArray[np.bool_]:
-    """(nx, ny, nz) cells that are mostly open."""
     return np.asarray(state["open"] > 0.5)
 
 
@@ -308,12 +307,10 @@ def _filled(
 
 
 def _corner_sum(values: Array) -> Array:
-    """Sum over the four corners of each cell."""
     return np.asarray(values[1:, 1:] + values[1:, :-1] + values[:-1, 1:] + values[:-1, :-1])
 
 
 def _neighbour_sum(values: Array) -> Array:
-    """Sum over the four neighbours of each cell."""
     padded = np.pad(values, 1)
     return np.asarray(padded[2:, 1:-1] + padded[:-2, 1:-1] + padded[1:-1, 2:] + padded[1:-1, :-2])
 

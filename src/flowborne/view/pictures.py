@@ -126,7 +126,6 @@ class Picture:
         return clock
 
     def _draw_legend(self, axes: Axes, box: Box) -> None:
-        """Draw the scales of length, force and colour in a row below the map."""
         width, height = box.width, box.height
         axes.set(xlim=(0, width), ylim=(0, height))
         axes.axis("off")
@@ -227,7 +226,6 @@ def _signed(value: float) -> str:
 
 
 def _width(axes: Axes, words: str) -> float:
-    """Width of a text in a legend."""
     text = axes.text(0.0, 0.0, words, fontsize=8.5)
     box = text.get_window_extent().transformed(axes.transData.inverted())
     text.remove()

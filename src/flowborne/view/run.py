@@ -161,7 +161,6 @@ class Run(OpenRun):
         return int(rows[0]) if rows.size else None
 
     def _check_geoms(self, positions: Array) -> None:
-        """Raise RunFolderError unless there is a position of each geometry."""
         if len(positions) != len(self.geoms):
             raise RunFolderError(
                 f"model.json of the run has {len(self.geoms)} geometries and its states "

@@ -220,7 +220,6 @@ class Fluid:
         )
 
     def _show_vortices(self, state: State, grid: Grid, vortices: FieldVortices | None) -> None:
-        """Show one mesh for each sense of rotation."""
         points, faces, warm = np.zeros((0, 3)), np.zeros((0, 3), int), np.zeros(0, bool)
         if vortices is not None:
             surface = vortex_surface(vortices, state, grid, self.toward, FINE)

@@ -29,9 +29,6 @@ MARKED_AGAIN = 0.05
 LIGHT_RATIO = 3.0
 """Strength of a light in a browser over that in a film: browsers divide it by pi."""
 
-AMBIENT = 0.75
-"""Strength of the ambient light."""
-
 ABOVE = ((0.25, 0.45, -1.0), 0.75, "#ffffff")
 """Direction, strength and colour of the light on a slab, which is seen from above."""
 
@@ -81,7 +78,7 @@ class Surroundings:
 def _add_lights(scene: SceneApi, slab: bool, shadows: bool) -> None:
     scene.configure_default_lights(False)
     scene.configure_environment_map(None)
-    scene.add_light_ambient("/lights/ambient", intensity=AMBIENT)
+    scene.add_light_ambient("/lights/ambient", intensity=0.75)
     for n, (direction, strength, colour) in enumerate([ABOVE] if slab else LIGHTS):
         red, green, blue = style.to_bytes(style.rgb(colour)).tolist()
         x, y, z = (-10.0 * np.array(direction)).tolist()
@@ -139,7 +136,6 @@ def _add_marks(scene: SceneApi, low: Array, high: Array, view: FilmView, slab: b
 
 
 def _add_edges(scene: SceneApi, grid: Grid) -> LineSegmentsHandle:
-    """Add the edges of the fluid's domain."""
     corners = np.array(list(product(*zip(grid.origin, grid.upper, strict=True))))
     ends = [(a, b) for a, b in combinations(corners, 2) if np.count_nonzero(a != b) == 1]
     return scene.add_line_segments(

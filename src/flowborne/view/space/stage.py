@@ -27,9 +27,6 @@ from flowborne.view.space.surfaces import (
 from flowborne.view.space.surroundings import Ground, Motes, stands_on_ground, water_of
 from flowborne.view.style import Pixels
 
-MULTI_SAMPLES = 8
-"""Samples per pixel of anti-aliasing."""
-
 
 class Stage:
     """Scene of a run in a plotter, which it owns from then on.
@@ -118,7 +115,6 @@ class Stage:
         self._plotter.close()
 
     def _look(self, number: int) -> None:
-        """Set the camera of a frame."""
         view, focus = self._plotter.camera, self._camera.focus[number]
         view.focal_point = focus
         view.position = focus + self._camera.away[number]
@@ -150,7 +146,7 @@ class Stage:
 
 
 def _light(plotter: pv.Plotter) -> None:
-    plotter.enable_anti_aliasing("msaa", multi_samples=MULTI_SAMPLES)
+    plotter.enable_anti_aliasing("msaa", multi_samples=8)
     for direction, strength, colour in LIGHTS:
         light = pv.Light(color=colour, intensity=strength, light_type="scene light")
         light.position, light.focal_point = -np.array(direction), (0.0, 0.0, 0.0)
