@@ -1,9 +1,9 @@
-"""The map of a picture, which shows the run itself: of a slab from above, or of space by VTK."""
+"""The map of a picture, which shows the run itself, of a slab; it is seen from above."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -15,17 +15,12 @@ from PIL import Image
 
 from flowborne.kernels.arrays import Array
 from flowborne.view import style
-from flowborne.view.fields import FieldVortices, Legend, Scale, faded, field_of, over
+from flowborne.view.fields import FieldVortices, faded, field_of, over
 from flowborne.view.framing import windows
 from flowborne.view.glyphs import SHAFT_WIDTH, Forces, arrow, camera_moves, crosses
 from flowborne.view.outlines import Outlines, flesh_loops
 from flowborne.view.run import Run, State
 from flowborne.view.shot import Shot
-from flowborne.view.space.camera import camera_of
-from flowborne.view.space.opengl import off_screen
-
-if TYPE_CHECKING:
-    from flowborne.view.space.stage import Stage
 
 ROUNDING = 1e-6
 """Share of a pixel that an image may lack and still fills it."""
@@ -240,51 +235,3 @@ def wind_arrows(view: Array, corner: Array, wind: Array) -> list[Array]:
             middle = corner + spacing * (np.array([column + 0.5 * (row % 2), row]) + 0.5)
             arrows.append(arrow(middle - 0.5 * vector, vector, 0.035 * spacing))
     return arrows
-
-
-class MapSpace:
-    """Map of space, drawn by VTK.
-
-    camera  of all frames
-    width   m across the map, at the bodies
-    aspect  height over width
-    forces  the scale of the arrows of forces
-    """
-
-    def __init__(self, run: Run, shot: Shot, aspect: float | None = None) -> None:
-        """`aspect`: required height over width of the map, if any."""
-        self.run = run
-        self._shot = shot
-        self.camera = camera_of(run, shot, aspect)
-        self.width, self.aspect = self.camera.width, self.camera.aspect
-        self.forces = Forces(run, min(self.camera.width, self.camera.height))
-        self._field = field_of(run, shot)
-        self.legend: Legend = () if self._field is None else self._field.legend
-        self.scale: Scale | None = None if self._field is None else self._field.scale
-        self._stage: Stage | None = None
-
-    def draw_on(self, axes: Axes, pixels: int) -> Sequence[Artist]:
-        """Set the stage; returns the artist of its image in `axes`, `pixels` wide at scale 1.
-
-        raises  ValueError if three dimensions cannot be drawn on this machine
-        """
-        self._image = MapImage(axes)
-        plotter = off_screen(*self._image.pixels)
-        # imports VTK, which off_screen has checked
-        from flowborne.view.space.stage import Stage
-
-        pixel = self.width / pixels
-        self._stage = Stage(
-            plotter, self.run, self.camera, self.forces, self._field, pixel, self._shot
-        )
-        return [self._image]
-
-    def show(self, number: int, state: State) -> None:
-        """Update the image to the `number`-th state."""
-        assert self._stage is not None
-        self._image.image = self._stage.image(number, state)
-
-    def close(self) -> None:
-        """Close VTK's window; nothing can be drawn afterwards."""
-        if self._stage is not None:
-            self._stage.close()

@@ -5,6 +5,8 @@ What does not change from frame to frame is drawn once; a frame redraws only the
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
@@ -19,10 +21,14 @@ from flowborne.kernels.arrays import Array
 from flowborne.view import style
 from flowborne.view.glyphs import SHAFT_WIDTH, arrow, round_number
 from flowborne.view.layout import MARGIN, Box, Layout
-from flowborne.view.maps import MapSlab, MapSpace
+from flowborne.view.maps import MapSlab
 from flowborne.view.plots import LETTERS_IN_LEGEND, Strip, joint_curves, shortened, strip_curves
 from flowborne.view.run import Run
 from flowborne.view.shot import Shot
+from flowborne.view.space.opengl import import_renderer
+
+if TYPE_CHECKING:
+    from flowborne.view.space.stage import MapSpace
 
 FIGURE_SPACE = "\u2007"
 """As wide as a digit, so that text does not move when its numbers change."""
@@ -54,13 +60,12 @@ class Picture:
         self.run = run
         self.shot = shot = run.shot if shot is None else shot
         curves = strip_curves(run) if shot.plots else []
-        kind = MapSlab if run.is_slab else MapSpace
         if shot.size is not None:
             self.layout = Layout.sized(shot.size, len(curves), bare=not shot.plots)
             box = self.layout.map
-            self.map: MapSlab | MapSpace = kind(run, shot, box.height / box.width)
+            self.map = _map_of(run, shot, box.height / box.width)
         else:
-            self.map = kind(run, shot)
+            self.map = _map_of(run, shot)
             aspect = self.map.aspect
             self.layout = Layout.of(aspect, len(curves)) if shot.plots else Layout.bare(aspect)
         self._metres = self.map.width / self.layout.map.width
@@ -209,6 +214,15 @@ class Picture:
                 f"{shortened(name, LETTERS_IN_LEGEND // 5)} {number.replace('-', '−')}{unit}"
             )
         return (4 * FIGURE_SPACE).join([*words, f"t = {time:.2f} s"])
+
+
+def _map_of(run: Run, shot: Shot, aspect: float | None = None) -> MapSlab | MapSpace:
+    if run.is_slab:
+        return MapSlab(run, shot, aspect)
+    import_renderer()
+    from flowborne.view.space.stage import MapSpace
+
+    return MapSpace(run, shot, aspect)
 
 
 def _bar_outline(left: float, middle: float, pixels: float, size: float) -> Array:

@@ -17,10 +17,10 @@ from flowborne.scenes.schema_film import CameraTable
 from flowborne.sim.running import RunOutcome
 from flowborne.view import style
 from flowborne.view.film import make_preview
-from flowborne.view.maps import MapSpace
 from flowborne.view.pictures import Picture
 from flowborne.view.run import Run
 from flowborne.view.shot import Shot
+from flowborne.view.space.stage import MapSpace
 from flowborne.view.space.surroundings import stands_on_ground
 
 from .projecting import project

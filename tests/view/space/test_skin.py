@@ -26,12 +26,12 @@ from flowborne.solids.elements import surface_of
 from flowborne.solids.model import SolidModel
 from flowborne.solids.tissue.growth import Tissue, add_flesh
 from flowborne.view import style
-from flowborne.view.maps import MapSpace
 from flowborne.view.pictures import Picture
 from flowborne.view.run import Flesh, Geom, Run
 from flowborne.view.space.camera import FILLED, camera_of
 from flowborne.view.space.lighting import KEY
 from flowborne.view.space.opengl import off_screen
+from flowborne.view.space.stage import MapSpace
 from flowborne.view.space.surfaces import (
     Outside,
     SkinSurface,

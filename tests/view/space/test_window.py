@@ -13,11 +13,11 @@ from flowborne.fluid.grid import Grid
 from flowborne.scenes.schema_film import CameraTable
 from flowborne.view import style
 from flowborne.view.fields import FieldDye, FieldVortices, side_weight
-from flowborne.view.maps import MapSpace
 from flowborne.view.pictures import Picture
 from flowborne.view.run import Run
 from flowborne.view.shot import Shot
 from flowborne.view.space.camera import FILLED_BY_FLUID, Camera, camera_of
+from flowborne.view.space.stage import MapSpace
 from flowborne.view.space.surroundings import water_of
 
 from .projecting import project
@@ -98,8 +98,7 @@ def test_dye_glows_where_it_is_and_the_box_is_around_it(
             middle = np.array(grid.origin) + grid.spacing * np.array([9.5, 5.0, 5.5])
             row, column = np.argwhere(cyan).mean(axis=0)
             assert (row, column) == pytest.approx(pixel_of(picture, number, middle), abs=15.0)
-            assert picture.map._stage is not None
-            moved = [np.array(edge.position) for _, edge in picture.map._stage._edges]
+            moved = [np.array(edge.position) for _, edge in picture.map._edges]
             assert np.abs(moved - 0.2 * MOVED[number]).max() < 1.6 * 0.2
 
 
