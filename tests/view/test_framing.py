@@ -12,7 +12,6 @@ from flowborne.view import style
 from flowborne.view.fields import FADED
 from flowborne.view.framing import domain_shown, through_window, window_path, windows
 from flowborne.view.maps import MapSlab
-from flowborne.view.outlines import Outlines
 from flowborne.view.pictures import Picture
 from flowborne.view.run import Run
 from flowborne.view.shot import Shot
@@ -35,7 +34,7 @@ def shot(**keys: object) -> Shot:
 
 
 def views_of(run: Run, shown: Shot) -> np.ndarray:
-    return windows(run, Outlines(run), shown, None)
+    return windows(run, shown)
 
 
 def test_the_path_of_a_domain_has_no_steps(run: Run) -> None:

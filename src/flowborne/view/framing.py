@@ -85,7 +85,7 @@ def _flesh_points(run: Run) -> Array:
     return vertices[:, np.unique(farthest)]
 
 
-def windows(run: Run, outlines: Outlines, shot: Shot, aspect: float | None) -> Array:
+def windows(run: Run, shot: Shot, aspect: float | None = None) -> Array:
     """(frames, 4) m, (x0, x1, y0, y1) that is shown in each frame; all of one size.
 
     aspect  height over width that it must have, if any
@@ -102,7 +102,7 @@ def windows(run: Run, outlines: Outlines, shot: Shot, aspect: float | None) -> A
     if camera.target is None and camera.distance is None:
         whole = _whole_domain(run, shot, radius)
         if whole is None and run.grid is None and camera.follow == "bodies":
-            whole = _swept_area(run, outlines)
+            whole = _swept_area(run)
         if whole is not None:
             centre, half = whole
             return _around(centre, _enlarged(half, aspect))
@@ -143,8 +143,9 @@ def _whole_domain(run: Run, shot: Shot, radius: float) -> tuple[Array, Array] | 
     return centre, half
 
 
-def _swept_area(run: Run, outlines: Outlines) -> tuple[Array, Array]:
+def _swept_area(run: Run) -> tuple[Array, Array]:
     """Centres (frames, 2) and half sides (2,) m of the area that bodies sweep, with a margin."""
+    outlines = Outlines(run)
     placed = [
         outline
         for state in run.sampled(SAMPLES)

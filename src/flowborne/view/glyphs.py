@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import combinations, product
+
 import numpy as np
 
 from flowborne.kernels.arrays import Array
@@ -40,25 +42,27 @@ MIN_CAMERA_PATH = 0.06
 """Extent of the camera's path above which there are marks, in smaller sides of the view."""
 
 
-def arrow(tail: Array, vector: Array, width: float) -> Array:
-    """(7, 2) corners of an arrow from `tail` (2,) along `vector` (2,) with a shaft `width` wide.
+def flat_arrows(tails: Array, vectors: Array, width: float) -> Array:
+    """(..., 7, 2) corners of arrows from `tails` (..., 2) along `vectors` (..., 2).
 
     The head of an arrow shorter than its head is scaled down. The tip is corner 3.
-    raises  ValueError if the vector is 0
+
+    width   of the shafts
+    raises  ValueError if a vector is 0
     """
-    length = float(np.hypot(*vector))
-    if not length > 0.0:
+    length = np.hypot(vectors[..., :1], vectors[..., 1:])
+    if not (length > 0.0).all():
         raise ValueError("an arrow of no length has no direction")
-    along = np.asarray(vector, float) / length
-    across = np.array([-along[1], along[0]])
-    width = min(width, length / HEAD_LENGTH)
-    neck = length - HEAD_LENGTH * width
-    half, wing = 0.5 * width, 0.5 * HEAD_WIDTH * width
+    along = vectors / length
+    across = np.stack([-along[..., 1], along[..., 0]], axis=-1)
+    shaft = np.minimum(width, length / HEAD_LENGTH)
+    neck, half, wing = length - HEAD_LENGTH * shaft, 0.5 * shaft, 0.5 * HEAD_WIDTH * shaft
+    zero = np.zeros_like(shaft)
     outline = [
-        (0.0, half), (neck, half), (neck, wing), (length, 0.0),
-        (neck, -wing), (neck, -half), (0.0, -half),
+        (zero, half), (neck, half), (neck, wing), (length, zero),
+        (neck, -wing), (neck, -half), (zero, -half),
     ]  # fmt: skip
-    return np.asarray(tail, float) + np.array([a * along + b * across for a, b in outline])
+    return np.stack([tails + (a * along + b * across) for a, b in outline], axis=-2)
 
 
 def round_number(value: float) -> float:
@@ -160,3 +164,10 @@ def motes(count: int, around: Array, reach: float) -> Array:
     points = 2.0 * reach * np.random.default_rng(1).random((count, 3))
     offset = points - around
     return np.asarray(around + offset - 2.0 * reach * np.round(offset / (2.0 * reach)))
+
+
+def box_edges(low: Array, high: Array) -> Array:
+    """(12, 2, 3) ends of the edges of a box between two corners (3,)."""
+    corners = np.array(list(product(*zip(low, high, strict=True))))
+    pairs = combinations(corners, 2)
+    return np.array([(a, b) for a, b in pairs if np.count_nonzero(a != b) == 1])

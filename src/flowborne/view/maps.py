@@ -17,7 +17,7 @@ from flowborne.kernels.arrays import Array
 from flowborne.view import style
 from flowborne.view.fields import FieldVortices, faded, field_of, over
 from flowborne.view.framing import windows
-from flowborne.view.glyphs import SHAFT_WIDTH, Forces, arrow, camera_moves, crosses
+from flowborne.view.glyphs import SHAFT_WIDTH, Forces, camera_moves, crosses, flat_arrows
 from flowborne.view.outlines import Outlines, flesh_loops
 from flowborne.view.run import Run, State
 from flowborne.view.shot import Shot
@@ -117,7 +117,7 @@ class MapSlab:
         assert not isinstance(field, FieldVortices)
         self._field = field
         self._outlines = Outlines(run)
-        self.views = windows(run, self._outlines, shot, aspect)
+        self.views = windows(run, shot, aspect)
         x0, x1, y0, y1 = self.views[0]
         self.width = float(x1 - x0)
         self.aspect = float((y1 - y0) / (x1 - x0))
@@ -175,7 +175,7 @@ class MapSlab:
             self._water.extent = (x0, x1, y0, y1)
         elif self.run.grid is None and self.run.wind.any():
             corner, wind = self.views[0, [0, 2]], self.run.wind.sum(axis=0)[:2]
-            self._wind.set_verts(wind_arrows(self.views[number], corner, wind))
+            self._wind.set_verts(list(wind_arrows(self.views[number], corner, wind)))
         if self._marks is not None:
             x0, x1, y0, y1 = self.views[number]
             self._marks.set_segments(
@@ -188,7 +188,7 @@ class MapSlab:
         self._flesh.set_paths([Path.make_compound_path(*_closed(loops))] if loops else [])
         width = SHAFT_WIDTH * self._pixel
         arrows = self.forces.arrows(state, self._pixel)
-        self._arrows.set_verts([arrow(tail, vector, width) for _, tail, vector in arrows])
+        self._arrows.set_verts([flat_arrows(tail, vector, width) for _, tail, vector in arrows])
 
     def close(self) -> None:
         """A slab has no resources to release."""
@@ -217,10 +217,10 @@ def faded_axes(run: Run, views: Array) -> tuple[int, ...]:
     )
 
 
-def wind_arrows(view: Array, corner: Array, wind: Array) -> list[Array]:
-    """Grid of arrows along `wind` (2,) in the window `view`; odd rows are shifted by half.
+def wind_arrows(view: Array, corner: Array, wind: Array) -> Array:
+    """(n, 7, 2) grid of arrows along `wind` (2,) in the window `view`.
 
-    The grid is fixed in the world.
+    The grid is fixed in the world; its odd rows are shifted by half.
 
     corner  (2,) m, of its lower left square
     """
@@ -229,9 +229,7 @@ def wind_arrows(view: Array, corner: Array, wind: Array) -> list[Array]:
     vector = 0.42 * spacing * wind / np.hypot(*wind)
     first = np.floor((np.array([x0, y0]) - corner) / spacing + 1e-6).astype(int)
     last = np.ceil((np.array([x1, y1]) - corner) / spacing - 1e-6).astype(int)
-    arrows = []
-    for row in range(first[1], last[1]):
-        for column in range(first[0], last[0]):
-            middle = corner + spacing * (np.array([column + 0.5 * (row % 2), row]) + 0.5)
-            arrows.append(arrow(middle - 0.5 * vector, vector, 0.035 * spacing))
-    return arrows
+    columns, rows = (np.arange(a, b) for a, b in zip(first, last, strict=True))
+    j, i = (index.ravel() for index in np.meshgrid(rows, columns, indexing="ij"))
+    middle = corner + spacing * (np.stack([i + 0.5 * (j % 2), j], axis=1) + 0.5)
+    return flat_arrows(middle - 0.5 * vector, vector, 0.035 * spacing)

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from flowborne.kernels.arrays import Array
 from flowborne.view import style
-from flowborne.view.glyphs import SHAFT_WIDTH, arrow, round_number
+from flowborne.view.glyphs import SHAFT_WIDTH, flat_arrows, round_number
 from flowborne.view.layout import MARGIN, Box, Layout
 from flowborne.view.maps import MapSlab
 from flowborne.view.plots import LETTERS_IN_LEGEND, Strip, joint_curves, shortened, strip_curves
@@ -197,7 +197,7 @@ class Picture:
         forces = self.map.forces
         force = round_number(forces.large)
         pixels = force / forces.large * forces.reach / self._metres
-        key = arrow(np.array([x, middle]), np.array([pixels, 0.0]), SHAFT_WIDTH)
+        key = flat_arrows(np.array([x, middle]), np.array([pixels, 0.0]), SHAFT_WIDTH)
         axes.add_collection(
             PolyCollection([key], facecolors=style.FORCE, edgecolors=style.EDGE, linewidths=0.8)
         )

@@ -29,7 +29,6 @@ from flowborne.view.browser.surroundings import Surroundings
 from flowborne.view.browser.viewer import GrowingRun, Viewer, open_viewer
 from flowborne.view.browser.viewpoint import FilmView, Viewpoint, camera_text
 from flowborne.view.framing import windows
-from flowborne.view.outlines import Outlines
 from flowborne.view.run import Run
 from flowborne.view.shot import Shot
 
@@ -265,8 +264,8 @@ def test_camera_of_a_slab_gives_the_same_film(folder: Path) -> None:
     view = FilmView.of(run)
     keys = tomllib.loads(camera_text("run", view.first, True).split("```")[1][4:])["film"]
     shot = Shot.model_validate(keys)
-    seen = windows(run, Outlines(run), shot, None)[0]
-    wanted = windows(run, Outlines(run), run.shot, None)[0]
+    seen = windows(run, shot)[0]
+    wanted = windows(run, run.shot)[0]
     assert seen[2:] == pytest.approx(wanted[2:], abs=0.01)
 
 

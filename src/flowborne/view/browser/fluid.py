@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from flowborne.fluid.grid import Array, Grid
 from flowborne.runs.states import cell_velocity
 from flowborne.view import style
-from flowborne.view.browser.meshes import Mesh, joined, nothing, show_mesh
+from flowborne.view.browser.meshes import Mesh, nothing, repeated, show_mesh
 from flowborne.view.browser.settings import Settings
 from flowborne.view.fields import (
     Field,
@@ -26,7 +26,7 @@ from flowborne.view.fields import (
     field_of,
     over,
 )
-from flowborne.view.glyphs import arrow
+from flowborne.view.glyphs import flat_arrows
 from flowborne.view.run import Run, State
 from flowborne.view.shot import Shot
 from flowborne.view.space.fluid import vortex_surface
@@ -93,16 +93,16 @@ def velocity_arrows(grid: Grid, state: State, axis: int, coordinate: float, spee
     i, j = (index.ravel() for index in np.meshgrid(*picked, indexing="ij"))
     middle = np.array([grid.origin[side] for side in sides])
     middle = middle + grid.spacing * (np.stack([i, j], axis=1) + 0.5)
-    meshes = []
-    for n in np.flatnonzero(free & (share > MIN_SPEED)):
-        vector = spacing / speed / max(1.0, share[n]) * velocity[n]
-        corners = arrow(middle[n] - 0.5 * vector, vector, 0.09 * spacing)
-        # on both sides of the image
-        for side in (-ARROW_OFFSET, ARROW_OFFSET):
-            points = np.empty((7, 3))
-            points[:, list(sides)], points[:, axis] = corners, coordinate + side * spacing
-            meshes.append((points, ARROW))
-    return joined(meshes)
+    shown = free & (share > MIN_SPEED)
+    if not shown.any():
+        return nothing()
+    vectors = (spacing / speed / np.maximum(1.0, share))[:, None] * velocity
+    corners = flat_arrows((middle - 0.5 * vectors)[shown], vectors[shown], 0.09 * spacing)
+    # on both sides of the image
+    points = np.empty((len(corners), 2, 7, 3))
+    points[..., list(sides)] = corners[:, None]
+    points[..., axis] = coordinate + spacing * np.array([[-ARROW_OFFSET], [ARROW_OFFSET]])
+    return repeated(points.reshape(-1, 7, 3), ARROW)
 
 
 def enlarged(image: Pixels, side: int) -> Pixels:

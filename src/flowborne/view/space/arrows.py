@@ -67,14 +67,6 @@ def arrows(tails: Array, vectors: Array, width: float) -> Array:
     return np.concatenate(rings, axis=1)
 
 
-def arrow_mesh(tails: Array, vectors: Array, width: float) -> tuple[Array, Integers]:
-    """Vertices (k, 3) m and triangles (m, 3), outward, of the same arrows."""
-    corners = arrows(tails, vectors, width)
-    triangles = np.concatenate([FACES[:, [0, 1, 2]], FACES[:, [0, 2, 3]]])
-    first = 5 * SIDES * np.arange(len(corners))
-    return corners.reshape(-1, 3), (first[:, None, None] + triangles).reshape(-1, 3)
-
-
 _TURN = 2.0 * np.pi * np.arange(SIDES) / SIDES
 _CIRCLE = np.stack([np.cos(_TURN), np.sin(_TURN)], axis=1)
 
@@ -89,6 +81,9 @@ def _faces() -> Integers:
 
 FACES = _faces()
 """(m, 4) corners of the faces of one arrow."""
+
+TRIANGLES = np.concatenate([FACES[:, [0, 1, 2]], FACES[:, [0, 2, 3]]])
+"""(2 m, 3) corners of the same faces in triangles, outward."""
 
 
 ROWS = 7

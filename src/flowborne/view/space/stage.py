@@ -13,7 +13,7 @@ from flowborne.fluid.grid import Array, Grid
 from flowborne.view import style
 from flowborne.view.fields import FieldDye, FieldNumber, FieldVortices, Legend, Scale, field_of
 from flowborne.view.framing import through_window, window_path
-from flowborne.view.glyphs import SHAFT_WIDTH, Forces, camera_moves
+from flowborne.view.glyphs import SHAFT_WIDTH, Forces, box_edges, camera_moves
 from flowborne.view.maps import MapImage
 from flowborne.view.run import Run, State
 from flowborne.view.shot import Shot
@@ -186,14 +186,9 @@ def _edges(plotter: pv.Plotter, grid: Grid) -> list[tuple[Array, pv.Actor]]:
     """
     low, high = np.array(grid.origin), np.array(grid.upper)
     edges = []
-    for axis in range(3):
-        for sides in np.ndindex(2, 2):
-            others = np.delete(np.arange(3), axis)
-            ends = np.stack([low, high])
-            ends[:, others] = np.where(sides, high[others], low[others])
-            facing = np.zeros((2, 3))
-            facing[[0, 1], others] = np.where(sides, 1.0, -1.0)
-            line = pv.line_segments_from_points(ends)
-            actor = plotter.add_mesh(line, color=style.LINE, line_width=1.2, lighting=False)
-            edges.append((facing, actor))
+    for ends in box_edges(low, high):
+        facing = np.diag(np.sign(ends.mean(axis=0) - 0.5 * (low + high)))
+        line = pv.line_segments_from_points(ends)
+        actor = plotter.add_mesh(line, color=style.LINE, line_width=1.2, lighting=False)
+        edges.append((facing[facing.any(axis=1)], actor))
     return edges
