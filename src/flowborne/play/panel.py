@@ -5,7 +5,7 @@ from __future__ import annotations
 from queue import SimpleQueue
 from typing import TYPE_CHECKING, Any
 
-from flowborne.play.controls import Controls, Settings, Slider
+from flowborne.play.controls import Controls, Settings
 from flowborne.play.memory import PlayedRun
 from flowborne.view.browser.panel import Panel
 from flowborne.view.browser.settings import Timeline
@@ -102,13 +102,11 @@ class PlayPanel(Panel):
             if title not in folders:
                 folders[title] = gui.add_folder(title, expand_by_default=few or not folders)
             with folders[title]:
-                if isinstance(control, Slider):
-                    low, high, step = control.low, control.high, control.step
-                    dial: Any = gui.add_slider(label, low, high, step, control.value)
+                value: Any = control.value
+                if control.options:
+                    dial: Any = gui.add_dropdown(label, control.options, initial_value=value)
                 else:
-                    dial = gui.add_dropdown(
-                        label, list(control.options), initial_value=control.value
-                    )
+                    dial = gui.add_slider(label, *control.limits, value)
             self._dials[control.name] = dial
 
     def _add_shown(self, gui: GuiApi, run: Run, view: FilmView) -> None:

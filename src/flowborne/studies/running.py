@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from time import perf_counter
 
@@ -125,27 +126,26 @@ def study(
             crew.close()
 
 
+@dataclass
 class _Job:
     """A study being run into its folder."""
 
-    def __init__(
-        self,
-        plan: Plan,
-        folder: Path,
-        workers: Workers,
-        retry: bool,
-        progress: Callable[[RunProgress], None] | None,
-    ) -> None:
-        self.plan, self.folder, self.workers = plan, folder, workers
-        self.retry, self.progress = retry, progress
-        write_text(folder / COPY, plan.text)
-        self.members = Members(folder / MEMBERS)
-        self.began = perf_counter()
-        self.finished: set[str] = set()
-        self.rows: list[Row] = []
+    plan: Plan
+    folder: Path
+    workers: Workers
+    retry: bool
+    progress: Callable[[RunProgress], None] | None
+    finished: set[str] = field(default_factory=set)
+    rows: list[Row] = field(default_factory=list)
+    began: float = field(default_factory=perf_counter)
+
+    @cached_property
+    def members(self) -> Members:
+        return Members(self.folder / MEMBERS)
 
     def run(self) -> StudyResult:
         plan = self.plan
+        write_text(self.folder / COPY, plan.text)
         if plan.study.sample.kind in OPTIMISERS:
             optimiser = Optimiser(plan.study)
             places = [plan.measures.index(table) for table in plan.study.goals]

@@ -183,7 +183,7 @@ class FieldNumber:
         sampled = [np.abs(self.values(state))[_in_fluid(state)] for state in run.sampled(SAMPLES)]
         sizes = _finite_sizes(sampled)
         self.limit = max(float(np.percentile(sizes, MAX_PERCENTILE)), 1e-12) if sizes.size else 1.0
-        self.table = style.pressure_table(255) if self._signed else style.speed_table(255)
+        self.table = style.number_table(style.PRESSURE if self._signed else style.SPEED, 255)
         low = -self.limit if self._signed else 0.0
         title = "pressure about its mean (Pa)" if self._signed else "speed (m/s)"
         self.scale: Scale | None = (self.table / 255.0, low, self.limit, title)
@@ -331,11 +331,8 @@ def vorticity_limit(values: Sequence[Array]) -> float:
 
     So a wake has the same colours in a large domain as in a small one.
     """
-    sizes = np.sort(_finite_sizes(values))[::-1]
-    if not sizes.size:
-        return 1.0
-    total = np.cumsum(sizes)
-    return max(float(sizes[np.searchsorted(total, STRONGER_CIRCULATION * total[-1])]), 1e-12)
+    sizes = _finite_sizes(values)
+    return max(_level_of(sizes, STRONGER_CIRCULATION), 1e-12) if sizes.size else 1.0
 
 
 def full_strength(frames: Sequence[NDArray[np.floating]]) -> float:
@@ -363,4 +360,5 @@ def _level_of(values: Array, share: float) -> float:
     positive = np.sort(values[values > 0.0])[::-1]
     if not positive.size:
         return 0.0
-    return float(positive[np.searchsorted(np.cumsum(positive), share * positive.sum())])
+    total = np.cumsum(positive)
+    return float(positive[np.searchsorted(total, share * total[-1])])

@@ -62,8 +62,15 @@ def radius_of(seen: Array) -> float:
 
 
 def swept(run: Run, geoms: Sequence[int]) -> Array:
-    """(frames, n, 3) m, outermost points of geometries and of all flesh; the origin if none."""
-    points = [] if run.flesh is None else [_flesh_points(run)]
+    """(frames, n, 3) m, outermost points of geometries and of all flesh; the origin if none.
+
+    Of flesh they are the vertices that are in any frame the farthest in one of 26 directions.
+    """
+    points = []
+    if run.flesh is not None:
+        vertices = run.every("flesh_vertices")
+        farthest = [np.argmax(frame @ DIRECTIONS.T, axis=0) for frame in vertices]
+        points.append(vertices[:, np.unique(farthest)])
     points += [_geom_points(run, geoms)] if geoms else []
     return np.concatenate(points, axis=1) if points else np.zeros((len(run), 1, 3))
 
@@ -76,13 +83,6 @@ def _geom_points(run: Run, geoms: Sequence[int]) -> Array:
         for n in geoms
     ]
     return np.concatenate(points, axis=1)
-
-
-def _flesh_points(run: Run) -> Array:
-    """(frames, k, 3) m, vertices that are in any frame the farthest in one of 26 directions."""
-    vertices = run.every("flesh_vertices")
-    farthest = [np.argmax(frame @ DIRECTIONS.T, axis=0) for frame in vertices]
-    return vertices[:, np.unique(farthest)]
 
 
 def windows(run: Run, shot: Shot, aspect: float | None = None) -> Array:
@@ -105,7 +105,10 @@ def windows(run: Run, shot: Shot, aspect: float | None = None) -> Array:
             whole = _swept_area(run)
         if whole is not None:
             centre, half = whole
-            return _around(centre, _enlarged(half, aspect))
+            if aspect is not None:
+                width = max(half[0], half[1] / aspect)
+                half = np.array([width, aspect * width])
+            return _around(centre, half)
     height = ROOM * radius
     if camera.distance is not None:
         height = camera.distance * np.tan(0.5 * np.radians(camera.lens))
@@ -158,14 +161,6 @@ def _swept_area(run: Run) -> tuple[Array, Array]:
     half = half + 0.6 * max(half.max(), 1e-6)
     half = np.maximum(half, 0.8 * half.max())
     return np.broadcast_to(middle, (len(run), 2)), half
-
-
-def _enlarged(half: Array, aspect: float | None) -> Array:
-    """Half sides (2,) that contain `half` and have an aspect, if one is given."""
-    if aspect is None:
-        return half
-    width = max(half[0], half[1] / aspect)
-    return np.array([width, aspect * width])
 
 
 def smoothed(path: Array, frames_per_second: float) -> Array:

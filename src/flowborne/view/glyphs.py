@@ -84,11 +84,19 @@ class Forces:
     def __init__(self, run: Run, side: float) -> None:
         """`side`: smaller side of the view, m."""
         self._axes = 2 if run.is_slab else 3
-        self._bodies = _drawn_bodies(run)
+        carrying = () if run.flesh is None else run.flesh.bodies
+        drawn = sorted({*carrying, *(geom.body for geom in run.geoms)})
+        # the world is among them only if it is the only one
+        self._bodies = [body for body in drawn if body > 0] or drawn
         self.most = len(self._bodies)
         self.reach = LARGE_FORCE_LENGTH * side
-        large = self._large(run)
-        self.large = large if large > _rounding(run, side) else 0.0
+        self.large = 0.0
+        if self._bodies:
+            forces = run.every("fluid_force")[:, self._bodies, : self._axes]
+            sizes = np.linalg.norm(forces, axis=-1).max(axis=1)
+            finite = sizes[np.isfinite(sizes) & (sizes > 0.0)]
+            large = float(np.percentile(finite, LARGE_FORCE_PERCENTILE)) if finite.size else 0.0
+            self.large = large if large > _rounding(run, side) else 0.0
         self.unit = "N/m" if run.is_slab else "N"
 
     def arrows(self, state: State, pixel: float) -> list[tuple[int, Array, Array]]:
@@ -109,14 +117,6 @@ class Forces:
             arrows.append((body, tail, min(1.0, MAX_FORCE_LENGTH * self.reach / length) * vector))
         return arrows
 
-    def _large(self, run: Run) -> float:
-        if not self._bodies:
-            return 0.0
-        forces = run.every("fluid_force")[:, list(self._bodies), : self._axes]
-        sizes = np.linalg.norm(forces, axis=-1).max(axis=1)
-        finite = sizes[np.isfinite(sizes) & (sizes > 0.0)]
-        return float(np.percentile(finite, LARGE_FORCE_PERCENTILE)) if finite.size else 0.0
-
 
 def _rounding(run: Run, side: float) -> float:
     """Force on bodies in a fluid at rest that comes from rounding, N (N/m in a slab).
@@ -126,13 +126,6 @@ def _rounding(run: Run, side: float) -> float:
     duration = (len(run) - 1) / run.frames_per_second
     mass = run.density * side ** (2 if run.is_slab else 3)
     return 2.0 * ROUNDING_SHIFT * mass * side / duration**2 if duration > 0.0 else 0.0
-
-
-def _drawn_bodies(run: Run) -> tuple[int, ...]:
-    """Bodies that are drawn; the world is among them only if it is the only one."""
-    carrying = () if run.flesh is None else run.flesh.bodies
-    drawn = sorted({*carrying, *(geom.body for geom in run.geoms)})
-    return tuple(body for body in drawn if body > 0) or tuple(drawn)
 
 
 def camera_moves(path: Array, side: float) -> bool:

@@ -185,7 +185,8 @@ class MapSlab:
         self._bodies.set_verts([outlines[n] for n in self._shown])
         loops = flesh_loops(self.run, state)
         # one path of all loops, so that holes in the flesh stay empty
-        self._flesh.set_paths([Path.make_compound_path(*_closed(loops))] if loops else [])
+        closed = [Path(np.concatenate([loop, loop[:1]]), closed=True) for loop in loops]
+        self._flesh.set_paths([Path.make_compound_path(*closed)] if loops else [])
         width = SHAFT_WIDTH * self._pixel
         arrows = self.forces.arrows(state, self._pixel)
         self._arrows.set_verts([flat_arrows(tail, vector, width) for _, tail, vector in arrows])
@@ -196,10 +197,6 @@ class MapSlab:
     def _look(self, number: int) -> None:
         x0, x1, y0, y1 = self.views[number]
         self._axes.set(xlim=(x0, x1), ylim=(y0, y1))
-
-
-def _closed(loops: list[Array]) -> list[Path]:
-    return [Path(np.concatenate([loop, loop[:1]]), closed=True) for loop in loops]
 
 
 def faded_axes(run: Run, views: Array) -> tuple[int, ...]:

@@ -22,7 +22,14 @@ from flowborne.view import style
 from flowborne.view.glyphs import SHAFT_WIDTH, flat_arrows, round_number
 from flowborne.view.layout import MARGIN, Box, Layout
 from flowborne.view.maps import MapSlab
-from flowborne.view.plots import LETTERS_IN_LEGEND, Strip, joint_curves, shortened, strip_curves
+from flowborne.view.plots import (
+    LETTERS_IN_LEGEND,
+    Strip,
+    joint_curves,
+    shortened,
+    signed,
+    strip_curves,
+)
 from flowborne.view.run import Run
 from flowborne.view.shot import Shot
 from flowborne.view.space.opengl import import_renderer
@@ -147,7 +154,7 @@ class Picture:
             x = _write(axes, x + 16, middle, name)
         if self.map.scale is not None:
             colours, low, high, name = self.map.scale
-            words = f"{name}   {_signed(low)}"
+            words = f"{name}   {signed(low)}"
             right, half = width - 60, 5
             left = min(max(width - 260, x + _width(axes, words) + 8), right - MIN_SCALE)
             axes.imshow(
@@ -157,7 +164,7 @@ class Picture:
                 interpolation="bilinear",
             )
             axes.set(xlim=(0, width), ylim=(0, height))
-            _write(axes, right + 8, middle, _signed(high))
+            _write(axes, right + 8, middle, signed(high))
             _write(axes, left - 8, middle, words, "right")
 
     def _bar(self, most: float) -> tuple[float, float]:
@@ -233,10 +240,6 @@ def _bar_outline(left: float, middle: float, pixels: float, size: float) -> Arra
     y = [tick, tick, thin, thin, tick, tick]
     upper = np.column_stack([x, y])
     return np.concatenate([upper, upper[::-1] * [1.0, -1.0]]) + np.array([0.0, middle])
-
-
-def _signed(value: float) -> str:
-    return f"{value:.2g}".replace("-", "−")
 
 
 def _width(axes: Axes, words: str) -> float:

@@ -118,6 +118,11 @@ def shortened(name: str, letters: int) -> str:
     return f"{name[: letters - 1 - tail]}…{name[-tail:]}"
 
 
+def signed(value: float) -> str:
+    """A number at the end of a colour scale, with a true minus."""
+    return f"{value:.2g}".replace("-", "−")
+
+
 def strip_style(axes: Axes) -> None:
     """Style axes as dark with a faint grid."""
     axes.set_facecolor(style.WATER)

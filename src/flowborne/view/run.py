@@ -61,7 +61,6 @@ class Flesh:
         return state["flesh_vertices"].astype(float)
 
 
-@dataclass(frozen=True)
 class CarriedSkin:
     """A skin of the model, bound to bodies.
 
@@ -74,13 +73,16 @@ class CarriedSkin:
     rgb        (3,) colour
     """
 
-    rest: Array
-    triangles: NDArray[np.int64]
-    bodies: NDArray[np.int64]
-    weights: Array
-    position: Array
-    rotation: Array
-    rgb: Array
+    def __init__(self, entry: dict[str, Any]) -> None:
+        """`entry`: of the skin in model.json. Raises ValueError if it lacks a vertex."""
+        _check_numbers(entry["triangles"], entry["vertices"], "vertex")
+        self.rest = np.asarray(entry["vertices"], float)
+        self.triangles = np.asarray(entry["triangles"], np.int64)
+        self.bodies = np.asarray(entry["bodies"], np.int64)
+        self.weights = np.asarray(entry["weights"], float)
+        self.position = np.asarray(entry["body_position"], float)
+        self.rotation = np.asarray(entry["body_rotation"], float)
+        self.rgb = np.asarray(entry["rgba"][:3], float)
 
     def vertices(self, state: State) -> Array:
         """(k, 3) m, in a state."""
@@ -125,7 +127,7 @@ class Run(OpenRun):
             self.flesh = None
             if self.skin is not None:
                 self.flesh = Flesh(self.skin, tuple(model["flesh"]["bodies"]))
-            self.carried = tuple(_carried(entry) for entry in model.get("skins", ()))
+            self.carried = tuple(CarriedSkin(entry) for entry in model.get("skins", ()))
             self.sources = _sources(scene)
             self.shot = Shot.model_validate(scene.get("film", {}))
             self.history = _plotted(RunFolder(self.folder).history)
@@ -185,19 +187,6 @@ def _geom(entry: dict[str, Any]) -> Geom:
     covered = bool(entry.get("covered", False))
     shape = shape_of(entry["type"], size, mesh)
     return Geom(shape, int(entry["body"]), rgba, covered)
-
-
-def _carried(entry: dict[str, Any]) -> CarriedSkin:
-    _check_numbers(entry["triangles"], entry["vertices"], "vertex")
-    return CarriedSkin(
-        np.asarray(entry["vertices"], float),
-        np.asarray(entry["triangles"], np.int64),
-        np.asarray(entry["bodies"], np.int64),
-        np.asarray(entry["weights"], float),
-        np.asarray(entry["body_position"], float),
-        np.asarray(entry["body_rotation"], float),
-        np.asarray(entry["rgba"][:3], float),
-    )
 
 
 def _sources(scene: dict[str, Any]) -> Array:

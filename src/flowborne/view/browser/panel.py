@@ -14,7 +14,7 @@ from flowborne.view.browser.settings import Settings, Timeline
 from flowborne.view.browser.viewpoint import FilmView
 from flowborne.view.fields import Scale
 from flowborne.view.glyphs import Forces, round_number
-from flowborne.view.plots import robust_limits, strip_curves
+from flowborne.view.plots import robust_limits, signed, strip_curves
 from flowborne.view.run import Run
 
 if TYPE_CHECKING:
@@ -72,7 +72,7 @@ def _bar(scale: Scale) -> str:
     picked = colours[np.linspace(0, len(colours) - 1, 24).round().astype(int)]
     stops = ",".join(f"rgb({r},{g},{b})" for r, g, b in np.rint(255.0 * picked).astype(int))
     bar = f"height:11px;border-radius:3px;background:linear-gradient(to right,{stops})"
-    ends = f"<span>{_number(low)}</span><span>{_number(high)}</span>"
+    ends = f"<span>{signed(low)}</span><span>{signed(high)}</span>"
     between = "display:flex;justify-content:space-between;font-variant-numeric:tabular-nums"
     return f'{escape(name)}<div style="{bar}"></div><div style="{between}">{ends}</div>'
 
@@ -90,10 +90,6 @@ def _force(forces: Forces) -> str:
     )
     what = f"force on a body: {force:g} {forces.unit}"
     return f'<span style="{line}"></span><span style="{head}"></span>{what}'
-
-
-def _number(value: float) -> str:
-    return f"{value:.2g}".replace("-", "−")
 
 
 class Curves:

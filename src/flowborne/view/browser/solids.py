@@ -121,7 +121,7 @@ class ForceArrows:
         self._arrows: MeshHandle | None = None
         self._outside = None
         if not run.is_slab:
-            self._outside = Outside(run.geoms, [mesh_of(geom) for geom in run.geoms], run.skins)
+            self._outside = Outside(run.geoms, run.skins)
 
     def show(self, state: State, visible: bool, along: Array) -> None:
         """Show the arrows of a state, or none.

@@ -75,7 +75,7 @@ class MapSpace:
         self._skins = [
             SkinSurface(plotter, skin, first, seen_through=shot.bones) for skin in run.skins
         ]
-        self._outside = Outside(run.geoms, meshes, run.skins)
+        self._outside = Outside(run.geoms, run.skins)
         self._arrows = Arrows(plotter, max(len(run.bodies), 1), style.FORCE, 0.35)
         self._ground = self._wind = self._motes = None
         if stands_on_ground(run):
