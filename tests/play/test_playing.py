@@ -109,7 +109,7 @@ def test_nothing_played_is_not_recorded(play: Play, tmp_path: Path) -> None:
 
 
 def test_frames_in_memory_are_a_run(play: Play) -> None:
-    run = PlayedRun.of(play)
+    run = PlayedRun(play)
     for _ in range(6):
         run.append(advanced(play, run.moments[-1], 1))
     run.update_history()
@@ -123,7 +123,7 @@ def test_frames_in_memory_are_a_run(play: Play) -> None:
 
 
 def test_the_oldest_frames_are_dropped_beyond_the_memory(play: Play) -> None:
-    run = PlayedRun.of(play, most=4 * advanced(play, play.first, 1).bytes)
+    run = PlayedRun(play, most=4 * advanced(play, play.first, 1).bytes)
     for _ in range(8):
         run.append(advanced(play, run.moments[-1], 1))
     assert list(run.frames) == [5, 6, 7, 8]

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from flowborne.base.phrases import and_more
+from flowborne.base.tables import triple
 from flowborne.play.groups import Group
 from flowborne.scenes.schema import Scene
 from flowborne.solids.joint_kinds import SLIDE, joint_kind
@@ -197,25 +198,21 @@ def _rate(model: SolidModel, joint: str) -> str:
     return "m/s" if joint_kind(model, joint) == SLIDE else "°/s"
 
 
-def _flows(scene: Scene) -> Iterator[Flow]:
+def _flows(scene: Scene) -> list[Flow]:
     """Winds that act as they are given, and inflow sides of a fluid that is simulated."""
     several = len(scene.wind) > 1
+    found: list[tuple[str, str, str, tuple[float, ...], float]] = []
     for n, wind in enumerate(scene.wind):
         title = f"wind {n + 1}" if several else "wind"
         if wind.kind == "force":
-            yield _flow(scene, title, f"wind.{n}.force", "N", wind.force)
+            found.append((title, f"wind.{n}.force", "N", wind.force, 0.0))
         elif wind.kind == "faces" or (wind.kind == "stream" and not scene.has_fluid):
-            yield _flow(scene, title, f"wind.{n}.velocity", "m/s", wind.velocity)
-    if not scene.has_fluid or scene.boundaries is None:
-        return
-    for name, side in scene.boundaries:
+            found.append((title, f"wind.{n}.velocity", "m/s", wind.velocity, 0.0))
+    for name, side in (scene.boundaries or ()) if scene.has_fluid else ():
         if side.kind == "inflow":
-            yield _flow(
-                scene, f"stream at {name}", f"boundaries.{name}.velocity", "m/s", side.velocity
-            )
-
-
-def _flow(scene: Scene, title: str, key: str, unit: str, vector: Sequence[float]) -> Flow:
-    x, y, z = vector
-    ease = EASE if key.startswith("boundaries") else 0.0
-    return Flow(title, key, unit, (x, y, z), ease, scene.is_slab)
+            key = f"boundaries.{name}.velocity"
+            found.append((f"stream at {name}", key, "m/s", side.velocity, EASE))
+    return [
+        Flow(title, key, unit, triple(vector), ease, scene.is_slab)
+        for title, key, unit, vector, ease in found
+    ]

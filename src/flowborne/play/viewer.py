@@ -283,7 +283,7 @@ def open_play(
     play = None
     try:
         play = Play(scene, workers)
-        return PlayViewer(server, play, PlayedRun.of(play), out)
+        return PlayViewer(server, play, PlayedRun(play), out)
     except BaseException:
         server.stop()
         if play is not None:

@@ -60,9 +60,9 @@ class OpenRun:
         """Number of states: one per frame, and the start."""
         return len(self._states)
 
-    @property
+    @cached_property
     def dyes(self) -> tuple[str, ...]:
-        found = (DYE.fullmatch(name) for name in self.arrays)
+        found = (DYE.fullmatch(name) for name in self.state(0))
         return tuple(match[1] for match in found if match)
 
     @cached_property

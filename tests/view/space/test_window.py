@@ -21,8 +21,8 @@ from flowborne.view.space.stage import MapSpace
 from flowborne.view.space.surroundings import water_of
 
 from .projecting import project
+from .test_fields import turning
 from .test_map_space import drawn, of_hue, pixel_of
-from .test_visible import turning
 
 Make = Callable[..., Run]
 
