@@ -11,7 +11,7 @@ import shlex
 import sys
 from collections.abc import Callable, Mapping
 from contextlib import closing
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from io import BytesIO
 from itertools import groupby
 from math import radians, tan
@@ -22,10 +22,10 @@ from PIL import Image
 
 from flowborne.scenes.load import load_scene, read_scene, scene_names
 from flowborne.scenes.schema import Scene
+from flowborne.scenes.schema_film import CameraTable
 from flowborne.sim.running import RunOutcome, run
 from flowborne.view.pictures import Picture
 from flowborne.view.run import Run
-from flowborne.view.shot import CameraShot
 from markdown_text import plain
 from marked import with_part
 
@@ -206,12 +206,13 @@ def write_picture(folder: Path, frame: int, path: Path) -> None:
     """A frame of a run as a small WebP."""
     made = Run(folder)
     width, height = SIZE
-    shot = replace(
-        made.shot,
-        plots=False,
-        scale_bar=False,
-        size=(width * OVERSAMPLING, height * OVERSAMPLING),
-        camera=camera_of(read_scene(folder / "scene.toml"), made.shot.camera),
+    shot = made.shot.model_copy(
+        update={
+            "plots": False,
+            "scale_bar": False,
+            "size": (width * OVERSAMPLING, height * OVERSAMPLING),
+            "camera": camera_of(read_scene(folder / "scene.toml"), made.shot.camera),
+        }
     )
     with closing(Picture(made, shot=shot)) as picture:
         pixels = picture.draw(frame)[:, :, :3].copy()
@@ -225,7 +226,7 @@ def write_picture(folder: Path, frame: int, path: Path) -> None:
     path.write_bytes(coded.getvalue())
 
 
-def camera_of(scene: Scene, camera: CameraShot) -> CameraShot:
+def camera_of(scene: Scene, camera: CameraTable) -> CameraTable:
     """A camera that fills the picture with a slab's domain: with its middle where a stream passes
     through it, and with the bodies elsewhere. In space, without a domain, and with one that follows
     bodies, the film's own."""
@@ -235,7 +236,7 @@ def camera_of(scene: Scene, camera: CameraShot) -> CameraShot:
     half_height = 0.5 * min(y1 - y0, (x1 - x0) * SIZE[1] / SIZE[0])
     distance = half_height / tan(0.5 * radians(camera.lens))
     target = (0.5 * (x0 + x1), 0.5 * (y0 + y1), 0.0) if has_inflow(scene) else None
-    return replace(camera, distance=distance, target=target)
+    return camera.model_copy(update={"distance": distance, "target": target})
 
 
 def write(names: list[str]) -> None:

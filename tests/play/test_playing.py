@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import flowborne as fb
-from flowborne.play.controls import Picker
 from flowborne.play.groups import with_choices
 from flowborne.play.memory import PlayedRun
 from flowborne.play.playing import Moment, Play
@@ -110,7 +109,7 @@ def test_nothing_played_is_not_recorded(play: Play, tmp_path: Path) -> None:
 
 
 def test_frames_in_memory_are_a_run(play: Play) -> None:
-    run = PlayedRun.of(play)
+    run = PlayedRun(play)
     for _ in range(6):
         run.append(advanced(play, run.moments[-1], 1))
     run.update_history()
@@ -124,7 +123,7 @@ def test_frames_in_memory_are_a_run(play: Play) -> None:
 
 
 def test_the_oldest_frames_are_dropped_beyond_the_memory(play: Play) -> None:
-    run = PlayedRun.of(play, most=4 * advanced(play, play.first, 1).bytes)
+    run = PlayedRun(play, most=4 * advanced(play, play.first, 1).bytes)
     for _ in range(8):
         run.append(advanced(play, run.moments[-1], 1))
     assert list(run.frames) == [5, 6, 7, 8]
@@ -147,6 +146,6 @@ def test_controls_of_a_scene_with_a_stream() -> None:
     names = [control.name for control in played.controls.all]
     assert "stream at x_min: speed (m/s)" in names
     assert "strength: hinge (°/s)" in names
-    (picker,) = (control for control in played.controls.all if isinstance(control, Picker))
+    (picker,) = (control for control in played.controls.all if control.options)
     assert picker.options == ("as in the scene", "least effort", "least drag", "most drag")
     played.close()

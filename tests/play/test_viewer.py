@@ -133,7 +133,7 @@ def test_input_motion_stands_beside_a_walker(tmp_path: Path) -> None:
     scene = fb.load_scene("human-wind-back")
     opened = open_play(scene, tmp_path / "out", host="127.0.0.1", port=free_port(), workers=1)
     opened.running = False
-    opened.panel._ghost.value = "beside"
+    opened.panel._controls["ghost"].value = "beside"
     stepped(opened, 12)
     assert opened._ghost is not None
     place = [np.array(mesh.position) for mesh in opened._ghost.meshes]

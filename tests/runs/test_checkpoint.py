@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from flowborne.base import array_file as arrays_file
-from flowborne.base.array_file import read_arrays
+from flowborne.base import given
+from flowborne.base.given import read_arrays
 from flowborne.coupling.world import Fluid, Setup, World
 from flowborne.fluid.grid import Grid
 from flowborne.fluid.state import FluidState
@@ -75,7 +75,7 @@ def test_arrays_of_another_shape_or_type_are_refused(tmp_path, world, name, chan
 
 
 def test_arrays_that_unpack_to_gigabytes_are_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr(arrays_file, "MOST_UNPACKED", 1 << 20)
+    monkeypatch.setattr(given, "MOST_UNPACKED", 1 << 20)
     path = tmp_path / "bomb.npz"
     np.savez(path, q=np.zeros(1 << 18))
     read_arrays(path)  # as large as its file

@@ -9,7 +9,6 @@ import pytest
 from flowborne.base.errors import SceneError
 from flowborne.runs.run_folder import RunFolder
 from flowborne.scenes.save import film_settings
-from flowborne.scenes.schema_film import FilmTable
 from flowborne.view.shot import Shot
 
 
@@ -21,13 +20,9 @@ def folder(tmp_path: Path) -> RunFolder:
     return RunFolder(tmp_path)
 
 
-def test_a_shot_and_the_table_have_the_same_defaults() -> None:
-    assert Shot.of(FilmTable().model_dump(mode="json", exclude_none=True)) == Shot()
-
-
 def test_settings_change_the_table_of_the_run(folder: RunFolder) -> None:
     told = {"camera.orbit": "30", "camera.target": "[1, 2]", "plots": "false", "size": "[640, 480]"}
-    shot = Shot.of(film_settings(folder, told))
+    shot = Shot.model_validate(film_settings(folder, told))
     assert (shot.field, shot.plots, shot.size) == ("dye", False, (640, 480))
     assert (shot.camera.lens, shot.camera.orbit) == (40.0, 30.0)
     assert shot.camera.target == (1.0, 2.0, 0.0)

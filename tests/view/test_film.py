@@ -115,7 +115,7 @@ def test_the_cost_of_chains_is_plotted_with_its_line(tmp_path: Path) -> None:
 
 
 def shot_of(**table: object) -> Shot:
-    return Shot.of(table)
+    return Shot.model_validate(table)
 
 
 def test_an_image_sequence_has_alpha_where_nothing_is(write_run: Write, tmp_path: Path) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-from dataclasses import replace
 from pathlib import Path
 
 import imageio.v3 as imageio
@@ -95,7 +94,7 @@ def test_the_map_holds_all_of_the_flesh_of_all_frames(fin: Path) -> None:
 def test_bones_are_hidden_until_they_are_asked_for(fin: Path) -> None:
     run = Run(fin)
     assert colour_at(Picture(run), 0, 0.3, 0.0) == pytest.approx(rgb(style.FLESH), abs=2)
-    picture = Picture(run, shot=replace(run.shot, bones=True))
+    picture = Picture(run, shot=run.shot.model_copy(update={"bones": True}))
     assert colour_at(picture, 0, 0.3, 0.0) == pytest.approx(rgb(style.ACCENT), abs=2)
     share = style.SEEN_THROUGH
     dim = share * rgb(style.FLESH) + (1.0 - share) * rgb(style.WATER)
@@ -121,12 +120,12 @@ def test_the_command_draws_bones_when_asked_to(fin: Path) -> None:
         stills.append(imageio.imread(fin / "preview.png"))
         film = imageio.imread(fin / "preview.mp4", plugin="FFMPEG")
         run = Run(fin)
-        shot = replace(run.shot, bones=bool(switch))
+        shot = run.shot.model_copy(update={"bones": bool(switch)})
         expected = Picture(run, shot=shot).draw(1)[:, :, :3].astype(int)
         assert np.abs(film[1] - expected).mean() < 4.0
     for still, bones in zip(stills, (False, True), strict=True):
         run = Run(fin)
-        expected = Picture(run, 1.5, replace(run.shot, bones=bones)).draw(1)[:, :, :3]
+        expected = Picture(run, 1.5, run.shot.model_copy(update={"bones": bones})).draw(1)[:, :, :3]
         np.testing.assert_array_equal(still, expected)
 
 

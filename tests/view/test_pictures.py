@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
@@ -278,9 +277,13 @@ def test_vorticity_of_a_rigid_rotation_is_twice_its_rate(write_run: Write) -> No
 
 def test_a_bare_picture_has_a_bar_of_the_length_that_it_says(write_run: Write) -> None:
     run = Run(write_run())
-    bare = replace(run.shot, plots=False, size=(480, 480))
+    bare = run.shot.model_copy(update={"plots": False, "size": (480, 480)})
     with_bar = Picture(run, shot=bare).draw(2)[:, :, :3].astype(int)
-    without = Picture(run, shot=replace(bare, scale_bar=False)).draw(2)[:, :, :3].astype(int)
+    without = (
+        Picture(run, shot=bare.model_copy(update={"scale_bar": False}))
+        .draw(2)[:, :, :3]
+        .astype(int)
+    )
     rows, columns = np.nonzero(like(with_bar, style.TEXT, 4) & ~like(without, style.TEXT, 4))
     low = rows > 480 * 0.9
     row = np.bincount(rows[low]).argmax()
@@ -307,5 +310,5 @@ def test_forces_of_rounding_have_no_arrow(write_run: Write) -> None:
 def test_an_image_that_fills_its_map_is_drawn_at_any_size(write_run: Write) -> None:
     """Rounding once took the shown part beyond the image's edge: 187 (96 / 187) > 96."""
     run = Run(write_run(field="dye"))
-    shot = replace(run.shot, plots=False, size=(187, 187))
+    shot = run.shot.model_copy(update={"plots": False, "size": (187, 187)})
     assert Picture(run, shot=shot).draw(1).any()

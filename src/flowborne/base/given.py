@@ -1,4 +1,4 @@
-"""Files named by a user: only regular ones, up to a maximum size."""
+"""Files named by a user: only regular ones, up to a maximum size, also of what they unpack to."""
 
 from __future__ import annotations
 
@@ -7,9 +7,12 @@ import json
 import os
 import stat
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 MOST_BYTES = 1 << 28
 """Maximum size of a file that is read whole, in bytes."""
@@ -20,6 +23,13 @@ systems limit file names to 255."""
 
 MOST_PATH = 2000
 """Maximum length of a path, in bytes."""
+
+SHORT = 200
+"""Maximum length of a quoted message of another library."""
+
+MOST_UNPACKED = 1 << 30
+"""Maximum size in memory of arrays with a smaller file, in bytes; those of runs are not
+compressed."""
 
 KINDS = {
     stat.S_IFDIR: "a folder",
@@ -77,6 +87,39 @@ def read_toml(path: Path) -> dict[str, Any]:
     """Content of a TOML file. Raises OSError as `read_file`, ValueError for invalid TOML."""
     found: dict[str, Any] = _parsed(path, tomllib.loads)
     return found
+
+
+def read_arrays(path: Path, names: Sequence[str] | None = None) -> dict[str, NDArray[Any]]:
+    """Arrays of an .npz file by name.
+
+    names   those to read; all when None
+    raises  OSError if the file cannot be opened; ValueError if it is cut, empty or no archive,
+            unpacks to more than MOST_UNPACKED, or lacks one of the names
+    """
+    check_file(path, None)
+    with open(path, "rb") as file:
+        try:
+            archive = np.lib.npyio.NpzFile(file)
+            assert archive.zip is not None
+            asked = sum(member.file_size for member in archive.zip.infolist())
+            most = max(MOST_UNPACKED, path.stat().st_size)
+            if asked > most:
+                raise ValueError(
+                    f"it unpacks to {asked / 2**30:.3g} GB, and {most / 2**30:.3g} GB are the most"
+                )
+            found = {name: archive[name] for name in names or archive.files}
+            for name, values in found.items():
+                if not isinstance(values, np.ndarray):  # NumPy returns other members as bytes
+                    raise ValueError(f"its '{name}' is no array")
+            return found
+        except Exception as error:  # NumPy, zip and zlib raise many types
+            raise ValueError(f"{path} is cut or no archive of arrays ({said_of(error)})") from error
+
+
+def said_of(error: Exception) -> str:
+    """The text of an error, in one short line without its full stop."""
+    text = " ".join(str(error).split()) or type(error).__name__
+    return text.rstrip(".") if len(text) <= SHORT else f"{text[:SHORT]} ..."
 
 
 def _parsed(path: Path, parse: Callable[[str], Any]) -> Any:

@@ -6,8 +6,7 @@ import math
 import sys
 from dataclasses import dataclass
 from time import monotonic
-from types import TracebackType
-from typing import Literal, TextIO
+from typing import Literal
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeRemainingColumn
@@ -49,10 +48,10 @@ class RunProgress:
 
 
 class ProgressDisplay:
-    """Shows `RunProgress` on `stream`; call it with each piece of news, inside a `with`."""
+    """Shows `RunProgress` on standard error; call it with each piece of news, inside a `with`."""
 
-    def __init__(self, stream: TextIO | None = None) -> None:
-        self._stream = sys.stderr if stream is None else stream
+    def __init__(self) -> None:
+        self._stream = sys.stderr
         self._bar: Progress | None = None
         self._started_at = 0
         self._first: float | None = None
@@ -72,12 +71,7 @@ class ProgressDisplay:
             self._bar.start()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         if self._bar is not None:
             self._bar.stop()
 

@@ -274,7 +274,7 @@ def study(
     See docs/studies.md.
     """
     from flowborne.base.progress import ProgressDisplay
-    from flowborne.studies.running import Plan, run_plan
+    from flowborne.studies.running import Plan, study
 
     plan = Plan.of(file)
     print(plan, flush=True)
@@ -282,7 +282,7 @@ def study(
         return
     with ProgressDisplay() as progress:
         try:
-            result = run_plan(plan, out, workers=workers, dask=dask, retry=retry, progress=progress)
+            result = study(plan, out, workers=workers, dask=dask, retry=retry, progress=progress)
         except KeyboardInterrupt as stop:
             raise StoppedError("interrupted; the same command continues the study") from stop
     for pair in plot or ():
@@ -353,7 +353,7 @@ def film(
     from flowborne.view.film import make_preview, write_shot
     from flowborne.view.shot import Shot
 
-    shot = Shot.of(film_settings(files, _overrides(settings)))
+    shot = Shot.model_validate(film_settings(files, _overrides(settings)))
     drawn = f"{files.picture}, {files.film}"
     began = perf_counter()
     with _writing(folder if out is None else out, ValueError), ProgressDisplay() as display:

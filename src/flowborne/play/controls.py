@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from flowborne.base.phrases import and_more
+from flowborne.base.tables import triple
 from flowborne.play.groups import Group
 from flowborne.scenes.schema import Scene
 from flowborne.solids.model import SLIDE, SolidModel, joint_kind
@@ -37,39 +38,19 @@ GOALS = {"least effort": "least", "least drag": "least", "most drag": "most"}
 
 
 @dataclass(frozen=True)
-class Slider:
-    """A number that can be set.
+class Control:
+    """A number or a choice that can be set.
 
-    name    of the setting; what precedes its last ": " is the title of the control's folder
-    low     smallest value
-    high    largest value
-    step    between values
-    value   at the start
+    name     of the setting; what precedes its last ": " is the title of the control's folder
+    value    at the start
+    limits   smallest value, largest value, and step of a number
+    options  what can be chosen in place of a number
     """
 
     name: str
-    low: float
-    high: float
-    step: float
-    value: float
-
-
-@dataclass(frozen=True)
-class Picker:
-    """A choice that can be set; `name` as that of a Slider.
-
-    options  what can be chosen; the first one is chosen at the start
-    """
-
-    name: str
-    options: tuple[str, ...]
-
-    @property
-    def value(self) -> str:
-        return self.options[0]
-
-
-Control = Slider | Picker
+    value: float | str
+    limits: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    options: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -95,16 +76,16 @@ class Flow:
         speed, azimuth, elevation = _polar(self.vector)
         most = FASTEST * (speed or 1.0)
         step = float(10.0 ** np.floor(np.log10(most / 50.0)))
-        yield Slider(f"{self.title}: speed ({self.unit})", 0.0, most, step, speed)
-        yield Slider(f"{self.title}: direction (°)", -180.0, 180.0, 1.0, azimuth)
+        yield Control(f"{self.title}: speed ({self.unit})", speed, (0.0, most, step))
+        yield Control(f"{self.title}: direction (°)", azimuth, (-180.0, 180.0, 1.0))
         if not self.slab:
-            yield Slider(f"{self.title}: upward (°)", -90.0, 90.0, 1.0, elevation)
-        yield Slider(f"{self.title}: gusts (%)", 0.0, 100.0, 5.0, 0.0)
-        yield Slider(f"{self.title}: a gust every (s)", 0.5, 8.0, 0.5, 2.0)
+            yield Control(f"{self.title}: upward (°)", elevation, (-90.0, 90.0, 1.0))
+        yield Control(f"{self.title}: gusts (%)", 0.0, (0.0, 100.0, 5.0))
+        yield Control(f"{self.title}: a gust every (s)", 2.0, (0.5, 8.0, 0.5))
 
     def mean(self, settings: Settings) -> list[float]:
         """(3,) without gusts; exactly that of the scene for the settings at the start."""
-        sliders = [c for c in self.controls() if isinstance(c, Slider)][: 2 if self.slab else 3]
+        sliders = list(self.controls())[: 2 if self.slab else 3]
         given = [float(settings[slider.name]) for slider in sliders]
         if given == [slider.value for slider in sliders]:
             return list(self.vector)
@@ -175,15 +156,15 @@ class Controls:
             yield from flow.controls()
         for group in self.groups:
             title = _title(group)
-            options = list(GOALS)[: 1 if group.drag is None else 3]
-            yield Picker(f"{title}: objective", (AS_IN_SCENE, *options))
-            yield Slider(f"{title}: weight", 0.0, HEAVIEST, 0.05, 1.0)
+            options = (AS_IN_SCENE, *list(GOALS)[: 1 if group.drag is None else 3])
+            yield Control(f"{title}: objective", AS_IN_SCENE, options=options)
+            yield Control(f"{title}: weight", 1.0, (0.0, HEAVIEST, 0.05))
             if group.close:
-                yield Slider(f"{title}: close to its motion", 0.0, HEAVIEST, 0.05, 1.0)
+                yield Control(f"{title}: close to its motion", 1.0, (0.0, HEAVIEST, 0.05))
         for name, number in self._strengths.items():
             strength = self._scene.control[number].strength
             step = float(10.0 ** np.floor(np.log10(strength / 20.0)))
-            yield Slider(name, step, STRONGEST * strength, step, strength)
+            yield Control(name, strength, (step, STRONGEST * strength, step))
 
     def _objectives(self, group: Group, settings: Settings) -> Values:
         """Weights, goals and directions of the objectives of a group."""
@@ -213,29 +194,24 @@ def _title(group: Group) -> str:
 
 
 def _rate(model: SolidModel, joint: str) -> str:
-    """Unit of the strength of a joint."""
     return "m/s" if joint_kind(model, joint) == SLIDE else "°/s"
 
 
-def _flows(scene: Scene) -> Iterator[Flow]:
+def _flows(scene: Scene) -> list[Flow]:
     """Winds that act as they are given, and inflow sides of a fluid that is simulated."""
     several = len(scene.wind) > 1
+    found: list[tuple[str, str, str, tuple[float, ...], float]] = []
     for n, wind in enumerate(scene.wind):
         title = f"wind {n + 1}" if several else "wind"
         if wind.kind == "force":
-            yield _flow(scene, title, f"wind.{n}.force", "N", wind.force)
+            found.append((title, f"wind.{n}.force", "N", wind.force, 0.0))
         elif wind.kind == "faces" or (wind.kind == "stream" and not scene.has_fluid):
-            yield _flow(scene, title, f"wind.{n}.velocity", "m/s", wind.velocity)
-    if not scene.has_fluid or scene.boundaries is None:
-        return
-    for name, side in scene.boundaries:
+            found.append((title, f"wind.{n}.velocity", "m/s", wind.velocity, 0.0))
+    for name, side in (scene.boundaries or ()) if scene.has_fluid else ():
         if side.kind == "inflow":
-            yield _flow(
-                scene, f"stream at {name}", f"boundaries.{name}.velocity", "m/s", side.velocity
-            )
-
-
-def _flow(scene: Scene, title: str, key: str, unit: str, vector: Sequence[float]) -> Flow:
-    x, y, z = vector
-    ease = EASE if key.startswith("boundaries") else 0.0
-    return Flow(title, key, unit, (x, y, z), ease, scene.is_slab)
+            key = f"boundaries.{name}.velocity"
+            found.append((f"stream at {name}", key, "m/s", side.velocity, EASE))
+    return [
+        Flow(title, key, unit, triple(vector), ease, scene.is_slab)
+        for title, key, unit, vector, ease in found
+    ]

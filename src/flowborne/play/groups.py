@@ -44,7 +44,14 @@ def with_choices(scene: Scene) -> tuple[Scene, tuple[Group, ...]]:
     objectives are in no group: it cannot be switched off for one of them.
     """
     tables = list(scene.objectives)
-    wanted = _wanted(scene)
+    wanted = {
+        joint: tuple(
+            n
+            for n, table in enumerate(scene.objectives)
+            if table.wanted_by is None or joint in table.wanted_by
+        )
+        for joint in scene.controlled_joints()
+    }
     groups = []
     for numbers in dict.fromkeys(wanted.values()):
         joints = tuple(joint for joint in wanted if wanted[joint] == numbers)
@@ -60,18 +67,6 @@ def with_choices(scene: Scene) -> tuple[Scene, tuple[Group, ...]]:
         groups.append(Group(joints, own, close, len(tables), drag))
         tables += added
     return scene.model_copy(update={"objectives": tuple(tables)}), tuple(groups)
-
-
-def _wanted(scene: Scene) -> dict[str, tuple[int, ...]]:
-    """Controlled joint -> numbers of its objectives."""
-    return {
-        joint: tuple(
-            n
-            for n, table in enumerate(scene.objectives)
-            if table.wanted_by is None or joint in table.wanted_by
-        )
-        for joint in scene.controlled_joints()
-    }
 
 
 def _choices(scene: Scene, joints: tuple[str, ...]) -> list[AnyObjective]:

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from contextlib import closing
-from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Literal
@@ -223,7 +222,7 @@ def picture_of(simulation: Simulation) -> Any:
     with TemporaryDirectory() as folder:
         write_state_alone(RunFolder(Path(folder) / "run"), simulation)
         run = Run(Path(folder) / "run")
-        with closing(Picture(run, 1.0, replace(run.shot, plots=False))) as picture:
+        with closing(Picture(run, 1.0, run.shot.model_copy(update={"plots": False}))) as picture:
             return picture.draw(len(run) - 1)[:, :, :3].copy()
 
 

@@ -10,7 +10,6 @@ import numpy as np
 from flowborne.kernels.arrays import Array
 from flowborne.play.playing import Moment, Play
 from flowborne.runs.run_folder import RunFolder
-from flowborne.runs.states import DYE
 from flowborne.sim.running import write_state_alone
 from flowborne.view.run import Run, State
 
@@ -26,22 +25,17 @@ class PlayedRun(Run):
     moments  the frames
     """
 
-    def __init__(self, folder: Path, first: Moment, most: int = MEMORY) -> None:
-        """`most`: bytes of frames that are kept."""
-        super().__init__(folder)
-        self.moments = [first]
-        self._bytes, self._most = first.bytes, most
-        self._index(np.array([first.row["time_s"]]))
-        self.update_history()
-
-    @classmethod
-    def of(cls, play: Play, most: int = MEMORY) -> PlayedRun:
-        """The run of a play that starts. Its folder is gone once it has been read."""
+    def __init__(self, play: Play, most: int = MEMORY) -> None:
+        """The run of a play that starts. `most`: bytes of frames that are kept."""
         first = play.first
         with TemporaryDirectory() as folder:
             path = Path(folder) / play.simulation.scene.name
             write_state_alone(RunFolder(path), play.simulation)
-            return cls(path, first, most)
+            super().__init__(path)
+        self.moments = [first]
+        self._bytes, self._most = first.bytes, most
+        self._index(np.array([first.row["time_s"]]))
+        self.update_history()
 
     def __len__(self) -> int:
         return len(self.moments)
@@ -51,11 +45,6 @@ class PlayedRun(Run):
 
     def every(self, name: str) -> Array:
         return np.asarray([moment.state[name] for moment in self.moments], float)
-
-    @property
-    def dyes(self) -> tuple[str, ...]:
-        found = (DYE.fullmatch(name) for name in self.moments[0].state)
-        return tuple(match[1] for match in found if match)
 
     def append(self, moment: Moment) -> None:
         """Add the next frame, and drop the oldest ones beyond the memory."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from queue import SimpleQueue
 from typing import TYPE_CHECKING, Any
 
-from flowborne.play.controls import Controls, Settings, Slider
+from flowborne.play.controls import Controls, Settings
 from flowborne.play.memory import PlayedRun
 from flowborne.view.browser.panel import Panel
 from flowborne.view.browser.settings import Timeline
@@ -44,7 +44,6 @@ class PlayPanel(Panel):
     ) -> None:
         self.asked: SimpleQueue[str] = SimpleQueue()
         self._has_ghost = run.moments[0].ghost is not None
-        self._ghost: Any = None
         self._controls_of_play = controls
         self._dials: dict[str, Any] = {}
         super().__init__(gui, run, view, timeline)
@@ -62,11 +61,6 @@ class PlayPanel(Panel):
         for name, value in settings.items():
             if self._dials[name].value != value:
                 self._dials[name].value = value
-
-    @property
-    def ghost(self) -> str:
-        """Which of GHOSTS is chosen."""
-        return "none" if self._ghost is None else str(self._ghost.value)
 
     def say(self, text: str) -> None:
         """Show a text below the buttons; Markdown."""
@@ -100,7 +94,6 @@ class PlayPanel(Panel):
         command.on_trigger(lambda _: self.asked.put(request))
 
     def _add_dials(self, gui: GuiApi) -> None:
-        """Add a control for all that can be set, in folders by the first part of its name."""
         folders: dict[str, Any] = {}
         titles = {control.name.rpartition(": ")[0] for control in self._controls_of_play.all}
         few = len(titles) <= EXPANDED
@@ -109,13 +102,11 @@ class PlayPanel(Panel):
             if title not in folders:
                 folders[title] = gui.add_folder(title, expand_by_default=few or not folders)
             with folders[title]:
-                if isinstance(control, Slider):
-                    low, high, step = control.low, control.high, control.step
-                    dial: Any = gui.add_slider(label, low, high, step, control.value)
+                value: Any = control.value
+                if control.options:
+                    dial: Any = gui.add_dropdown(label, control.options, initial_value=value)
                 else:
-                    dial = gui.add_dropdown(
-                        label, list(control.options), initial_value=control.value
-                    )
+                    dial = gui.add_slider(label, *control.limits, value)
             self._dials[control.name] = dial
 
     def _add_shown(self, gui: GuiApi, run: Run, view: FilmView) -> None:
@@ -124,4 +115,6 @@ class PlayPanel(Panel):
             walks = run.grid is None and not run.is_slab
             self._controls["follow"] = gui.add_checkbox("follow", walks)
         if self._has_ghost:
-            self._ghost = gui.add_dropdown("input motion", list(GHOSTS), initial_value="none")
+            self._controls["ghost"] = gui.add_dropdown(
+                "input motion", list(GHOSTS), initial_value="none"
+            )

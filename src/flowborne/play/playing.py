@@ -6,26 +6,25 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flowborne.base.progress import RunProgress
+from flowborne.coupling.world import Setup
 from flowborne.play.controls import Controls, Settings, Values
 from flowborne.play.groups import with_choices
-from flowborne.play.reference import InputMotion
 from flowborne.runs.checkpoint import load_checkpoint
 from flowborne.runs.recorder import Recorder
 from flowborne.runs.run_folder import RunFolder, RunFolderError
+from flowborne.scenes.bodies import initial_state
+from flowborne.scenes.capture import capture_of, clip_motion
 from flowborne.scenes.changes import ChangeTable
 from flowborne.scenes.save import with_frames
 from flowborne.scenes.schema import Scene
 from flowborne.sim.running import RunOutcome, run
 from flowborne.sim.simulation import Simulation, Snapshot
-from flowborne.view.run import PLOTTED
-
-State = dict[str, NDArray[Any]]
+from flowborne.solids.dynamics import kinematics
+from flowborne.view.run import PLOTTED, State
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +80,7 @@ class Play:
         self.controls = Controls(chosen, groups, model)
         self._last: Moment | None = None
         self._recorder = Recorder(RunFolder(Path()))
-        self._input = InputMotion.of(chosen, self.simulation.setup)
+        self._input = input_motion(chosen, self.simulation.setup)
 
     @cached_property
     def first(self) -> Moment:
@@ -161,7 +160,7 @@ class Play:
             dict(settings),
             values,
             self._recorder.arrays(simulation.world, None if report is None else report.drag()),
-            None if self._input is None else self._input.poses(simulation.time),
+            None if self._input is None else self._input(simulation.time),
             {c: row[c] for c in row if c in ("frame", "time_s") or c.startswith(PLOTTED)},
         )
 
@@ -177,3 +176,34 @@ class Play:
             and ours.keys() == theirs.keys()
             and all(np.array_equal(ours[n], theirs[n], equal_nan=True) for n in ours)
         )
+
+
+def input_motion(scene: Scene, setup: Setup) -> Callable[[float], State] | None:
+    """Function of a time (s) that gives geom_position (ng, 3) m and geom_rotation (ng, 3, 3) in the
+    motion that a scene is given; None if it has none.
+
+    The joints that follow a motion do so, and the controlled ones follow their clip. Others stay
+    where they start.
+    """
+    model = setup.solid
+    if not setup.motions or not scene.controlled_joints():
+        return None
+    start, motions = initial_state(scene, model).q, list(setup.motions)
+    capture = capture_of(scene)
+    if capture is not None:
+        own = set(scene.controlled_joints()) & set(capture.mapping)
+        joints = tuple(joint for joint in model.joint_names if joint in own)
+        whole = clip_motion(scene, model, start, joints)
+        motions += [] if whole is None else [whole]
+
+    def poses(time: float) -> State:
+        q = start.copy()
+        for motion in motions:
+            q[model.indices_of(motion.dofs)] = motion.position(time)
+        found = kinematics(model, q)
+        return {
+            "geom_position": found.geom_position.astype(np.float32),
+            "geom_rotation": found.geom_rotation.astype(np.float32),
+        }
+
+    return poses

@@ -121,7 +121,6 @@ class PlayViewer(RunView):
         return PlayPanel(self.server.gui, self.run, self._view, self.timeline, self._play.controls)
 
     def _read_requests(self) -> None:
-        """Do what buttons and keys asked for."""
         timeline = self.timeline
         while True:
             try:
@@ -165,7 +164,6 @@ class PlayViewer(RunView):
             self._job = self._thread.submit(self._play.advance, last, dials)
 
     def _collect(self) -> None:
-        """Take the result of the thread of the simulation, if it is done."""
         if self._job is None or not self._job.done():
             return
         job, self._job = self._job, None
@@ -186,15 +184,16 @@ class PlayViewer(RunView):
         self._done.append(monotonic())
         self.timeline.extend(run.times)
         self.timeline.newest = newest
+        self._shown = None
         self.panel.extend_time()
         if len(run) >= 2 * self._measured:
             self._measure()
 
     def _cut(self, count: int) -> None:
-        """Drop all frames but the first `count`."""
         self.run.cut(count)
         del self._path[count:], self._middles[count:]
         self.timeline.extend(self.run.times)
+        self._shown = None
 
     def _record(self, until: Moment) -> str:
         def show(news: RunProgress) -> None:
@@ -207,7 +206,6 @@ class PlayViewer(RunView):
         self._message = text
 
     def _status(self) -> str:
-        """Frames a second, what happens, and the last message."""
         now, wanted = monotonic(), self.run.frames_per_second
         while self._done and self._done[0] < now - RATED:
             self._done.popleft()
@@ -238,27 +236,20 @@ class PlayViewer(RunView):
         line = np.polynomial.polynomial.polyfit(n, middles, 1)
         return np.asarray(line[0] - self._start)
 
-    def _displacement(self, number: int) -> Array:
-        return self._path[number]
-
     def _domain_moved(self, number: int, state: State) -> Array:
         if self.run.grid is None:
             return np.zeros(3)
         return np.array(self.run.grid_at(state).origin) - self.run.grid.origin
 
-    def _more(self) -> object:
-        return self.panel.ghost, len(self.run)
-
     def _show_more(self, number: int, settings: Settings) -> None:
         moment = self.run.moments[number]
-        self._show_ghost(moment)
+        self._show_ghost(moment, settings.ghost)
         self._show_wind(moment)
 
-    def _show_ghost(self, moment: Moment) -> None:
+    def _show_ghost(self, moment: Moment, chosen: str) -> None:
         """Show the input motion where it was chosen to be."""
         if self._ghost is None or moment.ghost is None:
             return
-        chosen = self.panel.ghost
         aside = np.zeros(3)
         if chosen == "beside":
             toward = self._view.first.position - self._view.first.target
@@ -271,7 +262,6 @@ class PlayViewer(RunView):
             self._ghost.show(moment.ghost, bones=True)
 
     def _show_wind(self, moment: Moment) -> None:
-        """Show the wind as it is set."""
         winds = [flow for flow in self._play.controls.flows if flow.unit == "m/s"]
         if self.run.grid is not None or not winds:
             return
@@ -293,7 +283,7 @@ def open_play(
     play = None
     try:
         play = Play(scene, workers)
-        return PlayViewer(server, play, PlayedRun.of(play), out)
+        return PlayViewer(server, play, PlayedRun(play), out)
     except BaseException:
         server.stop()
         if play is not None:

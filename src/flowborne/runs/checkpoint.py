@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.base.array_file import read_arrays
 from flowborne.base.atomic import write_atomically
+from flowborne.base.given import read_arrays
 from flowborne.coupling.named import Sensed
 from flowborne.coupling.world import Setup, World
 from flowborne.fluid.state import under

@@ -1,8 +1,8 @@
-"""A run as an xarray data set that reads its states lazily."""
+"""Arrays of a run as variables of xarray, which read the states lazily."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -35,44 +35,14 @@ class LazyStates(BackendArray):
         return np.asarray(self._array[int(first)][rest])
 
 
-def dataset_of(
-    arrays: Mapping[str, StateArray],
-    frames: Sequence[int],
-    history: Mapping[str, HistoryArray],
-    rows: NDArray[np.int64],
-    bodies: Sequence[str],
-    joints: Sequence[str],
-    cells: Mapping[str, Any],
-    about: Mapping[str, Any],
-) -> xarray.Dataset:
-    """The arrays of a run, see `OpenRun.dataset`.
-
-    frames   frame number of each state
-    history  name -> quantity of the history
-    rows     (k,) frame of each of its rows
-    bodies   names of the bodies
-    joints   names of the joints
-    cells    coordinates of cells and faces; none without a fluid
-    about    attributes of the data set
-    """
-    variables = {name: _of_history(array, rows, frames) for name, array in history.items()}
-    for name, array in arrays.items():
-        if name != "time":
-            data = indexing.LazilyIndexedArray(LazyStates(array))
-            meaning = {"units": array.quantity.unit, "long_name": array.quantity.meaning}
-            variables[name] = xarray.Variable(("time", *array.quantity.dimensions), data, meaning)
-    coordinates: dict[str, Any] = {
-        "time": ("time", np.asarray(arrays["time"]), {"units": "s"}),
-        "frame": ("time", np.array(frames)),
-        "body": ("body", list(bodies)),
-        "joint": ("joint", list(joints)),
-        "axis": ("axis", list("xyz")),
-        **cells,
-    }
-    return xarray.Dataset(variables, coordinates, about)
+def state_variable(array: StateArray) -> xarray.Variable:
+    """An array of the states with its unit and meaning, read lazily."""
+    data = indexing.LazilyIndexedArray(LazyStates(array))
+    about = {"units": array.quantity.unit, "long_name": array.quantity.meaning}
+    return xarray.Variable(("time", *array.quantity.dimensions), data, about)
 
 
-def _of_history(
+def history_variable(
     array: HistoryArray, rows: NDArray[np.int64], frames: Sequence[int]
 ) -> xarray.Variable:
     """A quantity of the history at the times of the states, nan for states without a row."""
@@ -85,7 +55,7 @@ def _of_history(
     )
 
 
-def cell_coordinates(grid: Grid, window_axes: Sequence[int] = ()) -> dict[str, Any]:
+def cell_coordinates(grid: Grid, window_axes: Sequence[int]) -> dict[str, Any]:
     """Coordinates of cells and faces along the axes that have them.
 
     window_axes  along which the grid moves: coordinates are offsets from its lower corner

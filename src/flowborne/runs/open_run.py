@@ -60,9 +60,9 @@ class OpenRun:
         """Number of states: one per frame, and the start."""
         return len(self._states)
 
-    @property
+    @cached_property
     def dyes(self) -> tuple[str, ...]:
-        found = (DYE.fullmatch(name) for name in self.arrays)
+        found = (DYE.fullmatch(name) for name in self.state(0))
         return tuple(match[1] for match in found if match)
 
     @cached_property
@@ -145,23 +145,26 @@ class OpenRun:
         start, where the history has no row.
         raises  SceneError when xarray is not installed
         """
-        optional("xarray", "xarray", "xarray", "data sets")
-        from flowborne.runs.dataset import cell_coordinates, dataset_of
+        library = optional("xarray", "xarray", "xarray", "data sets")
+        from flowborne.runs.dataset import cell_coordinates, history_variable, state_variable
 
-        about: dict[str, Any] = {"scene": self.name, "frames_per_second": self.frames_per_second}
-        about["slab"] = int(self.is_slab)
-        cells = {} if self.grid is None else cell_coordinates(self.grid, self.window_axes)
-        history, rows = self.history, self.history["frame"].astype(np.int64)
-        return dataset_of(
-            self.arrays,
-            self.frames,
-            history_arrays(history, self.bodies, self.joints),
-            rows,
-            self.bodies,
-            self.joints,
-            cells,
-            about,
-        )
+        rows = self.history["frame"].astype(np.int64)
+        history = history_arrays(self.history, self.bodies, self.joints)
+        variables = {n: history_variable(array, rows, self.frames) for n, array in history.items()}
+        variables |= {n: state_variable(array) for n, array in self.arrays.items() if n != "time"}
+        coordinates: dict[str, Any] = {
+            "time": ("time", self.times, {"units": "s"}),
+            "frame": ("time", np.array(self.frames)),
+            "body": ("body", list(self.bodies)),
+            "joint": ("joint", list(self.joints)),
+            "axis": ("axis", list("xyz")),
+        }
+        if self.grid is not None:
+            coordinates |= cell_coordinates(self.grid, self.window_axes)
+        rate = self.frames_per_second
+        about = {"scene": self.name, "frames_per_second": rate, "slab": int(self.is_slab)}
+        found: xarray.Dataset = library.Dataset(variables, coordinates, about)
+        return found
 
 
 def _grid(entry: dict[str, Any] | None) -> Grid | None:

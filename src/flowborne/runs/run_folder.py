@@ -262,7 +262,6 @@ class RunFolder:
         return [*self.model_files(), *FIXED_NAMES]
 
     def _named_files(self) -> list[Path]:
-        """The existing ones of these files."""
         return [self.path / name for name in self._names() if (self.path / name).is_file()]
 
     def state_files(self) -> list[Path]:
@@ -288,7 +287,6 @@ class RunFolder:
                 folder.rmdir()
 
     def _remove_partial(self) -> None:
-        """Remove partial files of a killed run."""
         for name in self._names():
             path = self.path / name
             path.with_name(partial_name(path.name)).unlink(missing_ok=True)
@@ -311,7 +309,6 @@ def reading(folder: Path) -> Iterator[None]:
 
 
 def _is_possible(name: str) -> bool:
-    """Whether a file can have this name."""
     try:
         return bool(possible_name(name))
     except ValueError:

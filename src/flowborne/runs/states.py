@@ -11,8 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.base.array_file import read_arrays, said_of
-from flowborne.base.given import check_file
+from flowborne.base.given import check_file, read_arrays, said_of
 from flowborne.fluid.grid import Array, Grid
 from flowborne.runs.run_folder import RunFolder, RunFolderError
 

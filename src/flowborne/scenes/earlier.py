@@ -11,9 +11,8 @@ from pathlib import Path
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from flowborne.base.array_file import read_arrays
 from flowborne.base.errors import SceneError
-from flowborne.base.given import read_json
+from flowborne.base.given import read_arrays, read_json
 from flowborne.base.phrases import suggestion
 from flowborne.control.surroundings import Surroundings
 from flowborne.fluid.grid import Array

@@ -173,7 +173,6 @@ def _figure(folder: Path | None, out: Path, caption: str) -> str:
 
 
 def _links(done: ClipRun, out: Path) -> Iterator[str]:
-    """Links to the film and the folders of the runs that exist."""
     film = RunFolder(done.folder).film
     named = (("film", film), ("folder of the run", done.folder), ("as captured", done.captured))
     for name, path in named:
@@ -182,5 +181,4 @@ def _links(done: ClipRun, out: Path) -> Iterator[str]:
 
 
 def _link(path: Path, out: Path) -> str:
-    """Relative address of a file or folder."""
     return quote(path.relative_to(out).as_posix() + "/" * path.is_dir())

@@ -213,7 +213,6 @@ class _Batch:
 
 
 def _named(text: str, clip: Path) -> str:
-    """A text with the name of the clip instead of its path."""
     return text.replace(str(clip.absolute()), clip.name)
 
 

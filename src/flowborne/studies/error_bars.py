@@ -77,7 +77,14 @@ class Refinement:
                 Roache 1994, "Perspective: a method for uniform reporting of grid refinement
                 studies", J. Fluids Eng. 116, 405
         """
-        _check(resolutions, values)
+        if len(values) != len(resolutions) or len(values) < 2:
+            raise ValueError(
+                f"there are {len(values)} values at {len(resolutions)} resolutions. "
+                "Give two or more, one for each."
+            )
+        _check_growing("resolutions", resolutions)
+        if not np.isfinite(values).all():
+            raise ValueError(f"the values are {list(values)}. Give finite numbers.")
         h = 1.0 / np.array(resolutions[-3:], float)
         f = np.array(values[-3:], float)
         apart = float(np.ptp(f))
@@ -257,19 +264,6 @@ def _measured(done: OpenRun, measure: str | Callable[[OpenRun], float]) -> float
     return float(done.history[measure].mean())
 
 
-def _check(resolutions: Sequence[float], values: Sequence[float]) -> None:
-    """Raise ValueError for numbers that give no bar."""
-    if len(values) != len(resolutions) or len(values) < 2:
-        raise ValueError(
-            f"there are {len(values)} values at {len(resolutions)} resolutions. "
-            "Give two or more, one for each."
-        )
-    _check_growing("resolutions", resolutions)
-    if not np.isfinite(values).all():
-        raise ValueError(f"the values are {list(values)}. Give finite numbers.")
-
-
 def _check_growing(name: str, numbers: Sequence[float]) -> None:
-    """Raise ValueError unless they are positive, and each is larger than the one before."""
     if not (numbers[0] > 0 and np.isfinite(numbers).all() and np.all(np.diff(numbers) > 0)):
         raise ValueError(f"{name} are {list(numbers)}. Give positive numbers, from small to large.")

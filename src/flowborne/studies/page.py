@@ -74,7 +74,12 @@ def _plots(result: StudyResult, study: Study) -> Iterator[str]:
     if find_spec("matplotlib") is None:
         yield f'<p class="note">{NO_PLOTS}</p>'
         return
-    measures = [name for name in result.units if _is_measure(result, name)]
+    names = list(result.units)
+    measures = [
+        name
+        for name in names[names.index("cells") + 1 :]
+        if not name.endswith(BAR) and np.isfinite(result.columns[name]).any()
+    ]
     keys = [t.key for t in study.vary if result.columns[t.key].dtype.kind in "fiub"]
     goals = list(result.goals)
     pairs = [*zip(goals[1:], goals, strict=False), *product(keys, [*goals, *measures])]
@@ -83,11 +88,6 @@ def _plots(result: StudyResult, study: Study) -> Iterator[str]:
         result.plot(x, y, file)
         text = file.getvalue().decode()
         yield f"<div>{text[text.index('<svg') :]}</div>"
-
-
-def _is_measure(result: StudyResult, name: str) -> bool:
-    after = list(result.units).index(name) > list(result.units).index("cells")
-    return after and not name.endswith(BAR) and bool(np.isfinite(result.columns[name]).any())
 
 
 def _table(result: StudyResult) -> Iterator[str]:

@@ -106,14 +106,16 @@ class StudyResult:
         raises  ValueError for another column or format; SceneError if Matplotlib is not installed
         """
         optional("matplotlib", "Matplotlib", "film", "plots", "drawn")
-        from flowborne.view.plots import Points, plot_points
+        from flowborne.view.plots import plot_points
 
-        axes = [self._axis(name) for name in (x, y)]
+        points = self._axis(x), self._axis(y)
         front = self.front() if self.goals and {x, y} <= set(self.goals) else np.array([], int)
         finest = np.flatnonzero(self.columns["finest"])
-        bars = [self.columns.get(f"{name}{BAR}") for name in (x, y)]
-        points = Points(*axes, *(None if bar is None else bar[finest] for bar in bars))
-        plot_points(points, (self.label(x), self.label(y)), np.searchsorted(finest, front), path)
+        bar_columns = (self.columns.get(f"{name}{BAR}") for name in (x, y))
+        x_bar, y_bar = (None if bar is None else bar[finest] for bar in bar_columns)
+        labels = self.label(x), self.label(y)
+        best = np.searchsorted(finest, front)
+        plot_points(*points, (x_bar, y_bar), labels, best, path)
 
     def _axis(self, name: str) -> Array:
         if name not in self.columns or self.columns[name].dtype.kind not in "fiub":
@@ -199,7 +201,7 @@ def table_of(
     for key in study.keys:
         columns[key] = _column([row.settings[key] for row in rows])
     columns["outcome"] = np.array([row.ended.outcome for row in rows], object)
-    columns["cells"] = np.array([math.nan if c is None else c for c in _cells(rows)], float)
+    columns["cells"] = np.array([row.ended.cells for row in rows], float)
     units = {name: "" if "." in name else "1" for name in columns}
     for number, measure in enumerate(measures):
         columns[measure.name] = np.array([row.values[number] for row in rows], float)
@@ -212,12 +214,7 @@ def table_of(
     return StudyResult(folder, columns, units, goals, failed)
 
 
-def _cells(rows: Sequence[Row]) -> list[int | None]:
-    return [row.ended.cells for row in rows]
-
-
 def _column(values: list[Any]) -> Column:
-    """Values of a key: numbers, truth values or texts as they are, others as TOML."""
     if all(isinstance(value, int | float) for value in values):
         return np.array(values)
     return np.array([v if isinstance(v, str) else toml_text(v) for v in values], object)

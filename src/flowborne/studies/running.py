@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from time import perf_counter
 
@@ -18,17 +19,10 @@ from flowborne.runs.run_folder import LOCK_NAME, RunFolderError, check_name, mak
 from flowborne.scenes.load import load_scene
 from flowborne.sim.simulation import Simulation
 from flowborne.studies.members import Members, member_id, scene_digest
-from flowborne.studies.optimising import Optimiser
 from flowborne.studies.page import write_page
 from flowborne.studies.result import Row, StudyResult, measures_of, table_of, values_of
-from flowborne.studies.sampling import (
-    Sample,
-    count_samples,
-    is_optimisation,
-    repeats_of,
-    samples_of,
-)
-from flowborne.studies.schema import MeasureTable, Study, load_study, toml_text
+from flowborne.studies.sampling import Optimiser, Sample, count_samples, repeats_of, samples_of
+from flowborne.studies.schema import OPTIMISERS, MeasureTable, Study, load_study, toml_text
 from flowborne.studies.workers import DaskWorkers, Task, Workers
 
 COPY, TABLE, MEMBERS = "study.toml", "result.parquet", "members"
@@ -40,7 +34,6 @@ class Plan:
     """A study ready to start.
 
     study     as in its file
-    file      name of the file
     text      of the file
     measures  of each run
     columns   of the history of its scene
@@ -50,7 +43,6 @@ class Plan:
     """
 
     study: Study
-    file: str
     text: str
     measures: tuple[MeasureTable, ...]
     columns: tuple[str, ...]
@@ -68,7 +60,6 @@ class Plan:
             columns = simulation.columns.names
         return cls(
             study,
-            Path(file).name,
             Path(file).read_text(encoding="utf-8-sig"),
             measures_of(study, columns, Path(file).name),
             tuple(columns),
@@ -101,7 +92,7 @@ class Plan:
 
 
 def study(
-    file: str | Path,
+    file: str | Path | Plan,
     out: str | Path | None = None,
     *,
     workers: int | None = None,
@@ -111,7 +102,7 @@ def study(
 ) -> StudyResult:
     """Run a study, or what is missing of it, and write its table and page; see docs/studies.md.
 
-    file      TOML file of the study
+    file      TOML file of the study, or the plan of one
     out       folder to write; studies/<name of the study> by default. Finished runs in it are not
               run again
     workers   runs at once; changes no number. One per core by default, and all of a cluster
@@ -124,20 +115,7 @@ def study(
               lost; RunFolderError if `out` cannot be written or another process is writing there;
               KeyboardInterrupt after Ctrl-C. The same call then continues
     """
-    plan = Plan.of(file)
-    return run_plan(plan, out, workers=workers, dask=dask, retry=retry, progress=progress)
-
-
-def run_plan(
-    plan: Plan,
-    out: str | Path | None = None,
-    *,
-    workers: int | None = None,
-    dask: str | None = None,
-    retry: bool = False,
-    progress: Callable[[RunProgress], None] | None = None,
-) -> StudyResult:
-    """Run a study that has been planned; see `study`."""
+    plan = file if isinstance(file, Plan) else Plan.of(file)
     optional("pyarrow", "pyarrow", "study", "tables of studies", "written")
     folder = Path("studies") / plan.study.name if out is None else Path(out)
     with _locked(folder):
@@ -148,28 +126,27 @@ def run_plan(
             crew.close()
 
 
+@dataclass
 class _Job:
     """A study being run into its folder."""
 
-    def __init__(
-        self,
-        plan: Plan,
-        folder: Path,
-        workers: Workers,
-        retry: bool,
-        progress: Callable[[RunProgress], None] | None,
-    ) -> None:
-        self.plan, self.folder, self.workers = plan, folder, workers
-        self.retry, self.progress = retry, progress
-        write_text(folder / COPY, plan.text)
-        self.members = Members(folder / MEMBERS)
-        self.began = perf_counter()
-        self.finished: set[str] = set()
-        self.rows: list[Row] = []
+    plan: Plan
+    folder: Path
+    workers: Workers
+    retry: bool
+    progress: Callable[[RunProgress], None] | None
+    finished: set[str] = field(default_factory=set)
+    rows: list[Row] = field(default_factory=list)
+    began: float = field(default_factory=perf_counter)
+
+    @cached_property
+    def members(self) -> Members:
+        return Members(self.folder / MEMBERS)
 
     def run(self) -> StudyResult:
         plan = self.plan
-        if is_optimisation(plan.study):
+        write_text(self.folder / COPY, plan.text)
+        if plan.study.sample.kind in OPTIMISERS:
             optimiser = Optimiser(plan.study)
             places = [plan.measures.index(table) for table in plan.study.goals]
             while left := plan.samples - len(self.rows) // len(plan.repeats):

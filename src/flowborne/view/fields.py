@@ -1,28 +1,32 @@
-"""The fluid of a slab as an image of its cells, and the values behind it: filled and refined."""
+"""What is shown of the fluid: dye, vorticity, vortices, speed or pressure, and its colours."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Protocol
+from collections.abc import Sequence
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
 from flowborne.fluid.grid import Array, Grid
+from flowborne.runs.states import cell_vorticity, velocity_gradients
 from flowborne.view import style
 from flowborne.view.run import Run, State
 from flowborne.view.shot import Shot
 from flowborne.view.style import Pixels
 
+Single = NDArray[np.float32]
 Scale = tuple[Array, float, float, str]
 """Colours from lowest to highest (k, 3), lowest value, highest value, name."""
 Legend = Sequence[tuple[str, str]]
 """(name, colour) of each thing shown in its own colour."""
 
-SAMPLES = 24
+SAMPLES, SAMPLES_IN_SPACE = 24, 12
 """Frames from which the scale of a film is taken."""
+
+VORTEX_SHARE = 0.6
+"""Share of the sum of positive Q that is inside the surfaces of vortices."""
 
 MAX_PERCENTILE = 99.8
 """Percentile of speed and pressure at which their colours end: peaks are small in area."""
@@ -47,88 +51,64 @@ FILLED_LAYERS, FILLED_LAYERS_VORTICITY = 2, 4
 """Layers of cells in a body that continue the fluid; vorticity is also missing in cut cells."""
 
 
-class Field(Protocol):
-    """What is shown of the fluid."""
-
-    legend: Legend
-    scale: Scale | None
-
-    def image(self, state: State) -> Pixels:
-        """(k ny, k nx, 4) colours and opacities of the cells, or of k by k parts of each cell;
-        lowest row first."""
-        ...
-
-
-def field_of(run: Run, shot: Shot) -> Field | None:
-    """What `shot` shows of the fluid of `run`; None without fluid.
-
-    raises  ValueError if it shows dye and there is none
-    """
-    if run.grid is None:
-        return None
-    if shot.field == "dye":
-        return FieldDye(run)
-    if shot.field == "vorticity":
-        return FieldVorticity(run, shot.colour)
-    return FieldStill() if shot.field == "none" else FieldNumber(run, NUMBERS[shot.field])
-
-
-def dye_colours(run: Run, samples: int) -> tuple[dict[str, tuple[float, str]], Legend]:
-    """Array of dye -> (value at full colour, colour), and the legend.
-
-    samples  number of frames from which the values are taken
-    raises   ValueError if there is no dye
-    """
-    dyes = [name for name in run.state(0) if name.startswith("scalar_")]
-    if not dyes:
-        raise ValueError(
-            "the run has no dye to show; draw another field with --set field=vorticity, speed or "
-            "pressure"
-        )
-    sampled = run.sampled(samples)
-    colours = [style.DYES[n % len(style.DYES)] for n in range(len(dyes))]
-    full = [full_strength([state[dye] for state in sampled]) for dye in dyes]
-    legend = [(d.removeprefix("scalar_"), c) for d, c in zip(dyes, colours, strict=True)]
-    return dict(zip(dyes, zip(full, colours, strict=True), strict=True)), legend
-
-
-class FieldStill:
-    """Plain water."""
-
-    legend: Legend = ()
-    scale: Scale | None = None
-
-    def image(self, state: State) -> Pixels:
-        return np.zeros((1, 1, 4), np.uint8)
-
-
 class FieldDye:
-    """Dyes, each in its own colour, mixed where they meet."""
+    """Dyes, each in its own colour, mixed where they meet.
+
+    legend  (name, colour) of each
+    raises  ValueError if there is no dye
+    """
 
     scale: Scale | None = None
 
-    def __init__(self, run: Run) -> None:
-        self._dyes, self.legend = dye_colours(run, SAMPLES)
+    def __init__(self, run: Run, samples: int = SAMPLES) -> None:
+        """`samples`: number of frames from which the values at full colour are taken."""
+        names = [name for name in run.state(0) if name.startswith("scalar_")]
+        if not names:
+            raise ValueError(
+                "the run has no dye to show; draw another field with --set field=vorticity, speed "
+                "or pressure"
+            )
+        sampled = run.sampled(samples)
+        colours = [style.DYES[n % len(style.DYES)] for n in range(len(names))]
+        self._dyes = [
+            (name, full_strength([state[name] for state in sampled]), style.rgb(colour))
+            for name, colour in zip(names, colours, strict=True)
+        ]
+        self.legend: Legend = [
+            (name.removeprefix("scalar_"), colour)
+            for name, colour in zip(names, colours, strict=True)
+        ]
+        self._axes = run.window_axes
 
     def image(self, state: State) -> Pixels:
+        """(ny, nx, 4) colours and opacities of the cells of a slab, lowest row first."""
         known = _in_fluid(state)[:, :, 0]
-        strengths = [
-            np.clip(_filled(state[dye][:, :, 0] / full, known).T, 0.0, 1.0)[..., None]
-            for dye, (full, _) in self._dyes.items()
-        ]
-        weight: Array = np.zeros_like(strengths[0])
+        weight: Array = np.zeros((*known.T.shape, 1))
         colour, clear = np.repeat(weight, 3, axis=-1), np.ones_like(weight)
-        for strength, (_, name) in zip(strengths, self._dyes.values(), strict=True):
+        for name, full, own in self._dyes:
+            share = _filled(state[name][:, :, 0] / full, known)
+            strength = np.clip(share.T, 0.0, 1.0)[..., None]
             light = 0.25 * strength**3
-            colour += strength * (style.rgb(name) * (1.0 - light) + light)
+            colour += strength * (own * (1.0 - light) + light)
             weight += strength
             clear *= 1.0 - strength
         mixed = colour / np.maximum(weight, 1e-12)
         return style.to_bytes(np.concatenate([mixed, 1.0 - clear], axis=-1))
 
+    def smoke(self, state: State) -> tuple[Single, Single]:
+        """Colours (nx, ny, nz, 3) and densities (nx, ny, nz) of the cells, from 0 to 1."""
+        colour = np.zeros((*state["open"].shape, 3), np.float32)
+        weight = np.zeros(state["open"].shape, np.float32)
+        for name, full, own in self._dyes:
+            strength = np.clip(np.nan_to_num(state[name]) / full, 1e-6, 1.0)
+            colour += strength[..., None] * own.astype(np.float32)
+            weight += strength
+        density = np.minimum(weight, 1.0) * state["open"] * side_weight(weight.shape, self._axes)
+        return (colour / weight[..., None]).astype(np.float32), density.astype(np.float32)
+
 
 class FieldVorticity:
-    """Vorticity, warm if counter-clockwise, on one scale for all frames.
+    """Vorticity of a slab, warm if counter-clockwise, on one scale for all frames.
 
     limit  1/s, at the strongest colours
     """
@@ -137,8 +117,7 @@ class FieldVorticity:
 
     def __init__(self, run: Run, background: str) -> None:
         """`background`: colour at zero vorticity, "#rrggbb"."""
-        if run.grid is None:
-            raise ValueError("a run without fluid has no vorticity")
+        assert run.grid is not None
         self.grid = run.grid
         self.limit = vorticity_limit(
             [slab_vorticity(state, run.grid) for state in run.sampled(SAMPLES)]
@@ -148,44 +127,69 @@ class FieldVorticity:
         self.scale: Scale | None = (colours, -self.limit, self.limit, "vorticity (1/s)")
 
     def image(self, state: State) -> Pixels:
+        """(k ny, k nx, 4) colours and opacities of k by k parts of each cell, lowest row first."""
         share = _refined(slab_vorticity(state, self.grid).T / self.limit)
         return self.table[_table_rows(share, len(self.table))]
 
 
-@dataclass(frozen=True)
-class Shown:
-    """A cell quantity that can be shown.
+class FieldVortices:
+    """Vortices in space: iso-surfaces of Q, inside which rotation exceeds strain.
 
-    name    with its unit, for the scale
-    values  state -> (nx, ny, nz)
-    signed  whether it has both signs; otherwise it is never negative
-    table   count -> (count, 3) colours from lowest to highest
+    Q is half of (rotation rate squared - strain rate squared) (Hunt, Wray and Moin 1988). The
+    surfaces are warm where the rotation is counter-clockwise for the camera.
+
+    level  1/s^2, Q on the surfaces; see VORTEX_SHARE; the median over frames
     """
 
-    name: str
-    values: Callable[[State], Array]
-    signed: bool
-    table: Callable[[int], Pixels]
+    scale: Scale | None = None
+
+    def __init__(self, run: Run) -> None:
+        assert run.grid is not None
+        self._grid, self._axes = run.grid, run.window_axes
+        levels = [_level_of(self.q(state), VORTEX_SHARE) for state in run.sampled(SAMPLES_IN_SPACE)]
+        self.level = float(f"{max(float(np.median(levels)), 1e-12):.2g}")
+        self.legend: Legend = (
+            (f"vortices, Q = {self.level:g} /s², counter-clockwise", style.SPIN_LEFT[1]),
+            ("clockwise", style.SPIN_RIGHT[1]),
+        )
+
+    def q(self, state: State) -> Array:
+        """(nx, ny, nz) Q in the cells, 1/s^2; 0 in bodies and where it is not finite.
+
+        It goes to 0 at the sides of a domain that follows bodies, so that vortices have ends there.
+        """
+        gradients = velocity_gradients(self._grid, state)
+        q = -0.5 * np.einsum("ij...,ji...->...", gradients, gradients)
+        q *= side_weight(q.shape, self._axes)
+        return np.where(state["open"] > 0.5, np.nan_to_num(q), 0.0)
+
+    def sense(self, state: State, toward: Array) -> Array:
+        """(nx, ny, nz) sense of rotation seen from `toward` (3,), from -1 (clockwise) to 1."""
+        spin = np.nan_to_num(cell_vorticity(self._grid, state))
+        return np.asarray(spin @ toward / np.maximum(np.linalg.norm(spin, axis=-1), 1e-12))
 
 
 class FieldNumber:
-    """Speed or pressure, on one scale for all frames.
+    """Speed or pressure, on one scale for all frames: of a slab, or in a plane through space.
 
     limit  in the quantity's unit, at the end of the scale
     """
 
     legend: Legend = ()
 
-    def __init__(self, run: Run, shown: Shown) -> None:
-        self._shown, self.values = shown, shown.values
+    def __init__(self, run: Run, name: Literal["speed", "pressure"]) -> None:
+        self._signed = name == "pressure"
+        self.values = _pressure if self._signed else _speed
         sampled = [np.abs(self.values(state))[_in_fluid(state)] for state in run.sampled(SAMPLES)]
         sizes = _finite_sizes(sampled)
         self.limit = max(float(np.percentile(sizes, MAX_PERCENTILE)), 1e-12) if sizes.size else 1.0
-        self.table = shown.table(255)
-        low = -self.limit if shown.signed else 0.0
-        self.scale: Scale | None = (self.table / 255.0, low, self.limit, shown.name)
+        self.table = style.number_table(style.PRESSURE if self._signed else style.SPEED, 255)
+        low = -self.limit if self._signed else 0.0
+        title = "pressure about its mean (Pa)" if self._signed else "speed (m/s)"
+        self.scale: Scale | None = (self.table / 255.0, low, self.limit, title)
 
     def image(self, state: State) -> Pixels:
+        """(k ny, k nx, 4) colours and opacities of k by k parts of each cell, lowest row first."""
         values = _filled(self.values(state)[:, :, 0], _in_fluid(state)[:, :, 0])
         colours = self.colours(_refined(values.T))
         opaque = np.full((*colours.shape[:-1], 1), 255, np.uint8)
@@ -199,7 +203,26 @@ class FieldNumber:
     def colours(self, values: Array) -> Pixels:
         """(..., 3) colours of values in the quantity's unit."""
         share = values / self.limit
-        return self.table[_table_rows(share if self._shown.signed else 2.0 * share - 1.0, 255)]
+        return self.table[_table_rows(share if self._signed else 2.0 * share - 1.0, 255)]
+
+
+Field = FieldDye | FieldVorticity | FieldVortices | FieldNumber
+"""What is shown of the fluid, on scales that hold for all frames."""
+
+
+def field_of(run: Run, shot: Shot) -> Field | None:
+    """What `shot` shows of the fluid of `run`; None if nothing is visible.
+
+    raises  ValueError if it shows dye and there is none
+    """
+    if run.grid is None or shot.field == "none":
+        return None
+    slab = run.grid.is_slab
+    if shot.field == "dye":
+        return FieldDye(run, SAMPLES if slab else SAMPLES_IN_SPACE)
+    if shot.field == "vorticity":
+        return FieldVorticity(run, shot.colour) if slab else FieldVortices(run)
+    return FieldNumber(run, shot.field)
 
 
 def over(image: Pixels, background: str) -> Pixels:
@@ -263,7 +286,6 @@ def _pressure(state: State) -> Array:
 
 
 def _in_fluid(state: State) -> NDArray[np.bool_]:
-    """(nx, ny, nz) cells that are mostly open."""
     return np.asarray(state["open"] > 0.5)
 
 
@@ -285,12 +307,10 @@ def _filled(
 
 
 def _corner_sum(values: Array) -> Array:
-    """Sum over the four corners of each cell."""
     return np.asarray(values[1:, 1:] + values[1:, :-1] + values[:-1, 1:] + values[:-1, :-1])
 
 
 def _neighbour_sum(values: Array) -> Array:
-    """Sum over the four neighbours of each cell."""
     padded = np.pad(values, 1)
     return np.asarray(padded[2:, 1:-1] + padded[:-2, 1:-1] + padded[1:-1, 2:] + padded[1:-1, :-2])
 
@@ -311,11 +331,8 @@ def vorticity_limit(values: Sequence[Array]) -> float:
 
     So a wake has the same colours in a large domain as in a small one.
     """
-    sizes = np.sort(_finite_sizes(values))[::-1]
-    if not sizes.size:
-        return 1.0
-    total = np.cumsum(sizes)
-    return max(float(sizes[np.searchsorted(total, STRONGER_CIRCULATION * total[-1])]), 1e-12)
+    sizes = _finite_sizes(values)
+    return max(_level_of(sizes, STRONGER_CIRCULATION), 1e-12) if sizes.size else 1.0
 
 
 def full_strength(frames: Sequence[NDArray[np.floating]]) -> float:
@@ -338,8 +355,10 @@ def _table_rows(share: Array, count: int) -> NDArray[np.intp]:
     return np.rint(half + half * np.clip(np.nan_to_num(share), -1.0, 1.0)).astype(np.intp)
 
 
-NUMBERS = {
-    "speed": Shown("speed (m/s)", _speed, False, style.speed_table),
-    "pressure": Shown("pressure about its mean (Pa)", _pressure, True, style.pressure_table),
-}
-"""Fields that are one number per cell."""
+def _level_of(values: Array, share: float) -> float:
+    """Level such that larger values make up a share of the sum of positive ones; 0 if none are."""
+    positive = np.sort(values[values > 0.0])[::-1]
+    if not positive.size:
+        return 0.0
+    total = np.cumsum(positive)
+    return float(positive[np.searchsorted(total, share * total[-1])])

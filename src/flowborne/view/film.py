@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import closing, contextmanager
 from itertools import chain
 from pathlib import Path
 
 import imageio.v3 as imageio
 import imageio_ffmpeg  # type: ignore[import-untyped]
-import numpy as np
-from numpy.typing import NDArray
 
 from flowborne.base.atomic import partial_name, write_atomically
 from flowborne.runs.run_folder import RunFolder
@@ -18,9 +16,9 @@ from flowborne.view.drawing import drawn_frames
 from flowborne.view.pictures import Picture
 from flowborne.view.run import Run
 from flowborne.view.shot import Shot
+from flowborne.view.style import Pixels
 
 Progress = Callable[[int, int], None]
-Pixels = NDArray[np.uint8]
 
 PICTURE_SCALE = 1.5
 """Size of preview.png relative to the film."""
@@ -88,11 +86,17 @@ def write_shot(
             f"{', '.join(ENDINGS)}"
         )
     run = Run(folder)
+    shot = run.shot if shot is None else shot
     path.parent.mkdir(parents=True, exist_ok=True)
     if path.suffix.lower() in CODING:
         write_film(run, path, progress, shot)
         return str(path)
-    return write_sequence(run, path, progress, shot)
+    count = 0
+    with closing(_frames(run, shot, progress)) as frames:
+        for count, frame in enumerate(frames, start=1):
+            _write_image(path.with_name(f"{path.stem}_{count - 1:04d}{path.suffix}"), frame, shot)
+    first, last = (path.with_name(f"{path.stem}_{n:04d}{path.suffix}") for n in (0, count - 1))
+    return str(first) if count == 1 else f"{first} to {last.name}"
 
 
 def write_film(
@@ -110,33 +114,22 @@ def write_film(
             "a film in MP4 cannot be transparent; write an image sequence with --out frames.png, "
             "an image that moves with --out film.webp, or name a colour with --set background"
         )
-    numbers = shot.frames(run.times, run.frames_per_second)
     rate = shot.frames_per_second or run.frames_per_second
-    with closing(drawn_frames(run, shot, numbers)) as frames:
+    with closing(_frames(run, shot, progress)) as frames:
         first = next(frames)
         with film_file(path, (first.shape[1], first.shape[0]), rate) as send:
-            for done, frame in enumerate(chain([first], frames), start=1):
+            for frame in chain([first], frames):
                 send(frame)
-                if progress is not None:
-                    progress(done, len(numbers))
 
 
-def write_sequence(
-    run: Run, path: Path, progress: Progress | None = None, shot: Shot | None = None
-) -> str:
-    """Draw frames of `run` into numbered files like `path`; returns a text with first and last.
-
-    raises  ValueError if the shot does not fit the run; OSError if a file cannot be written
-    """
-    shot = run.shot if shot is None else shot
+def _frames(run: Run, shot: Shot, progress: Progress | None) -> Generator[Pixels, None, None]:
+    """The frames of a film, each valid until the next; `progress` is called after each one."""
     numbers = shot.frames(run.times, run.frames_per_second)
-    names = [path.with_name(f"{path.stem}_{n:04d}{path.suffix}") for n in range(len(numbers))]
     with closing(drawn_frames(run, shot, numbers)) as frames:
-        for done, (name, frame) in enumerate(zip(names, frames, strict=True), start=1):
-            _write_image(name, frame, shot)
+        for done, frame in enumerate(frames, start=1):
+            yield frame
             if progress is not None:
                 progress(done, len(numbers))
-    return str(names[0]) if len(names) == 1 else f"{names[0]} to {names[-1].name}"
 
 
 def _write_image(path: Path, frame: Pixels, shot: Shot) -> None:

@@ -1,18 +1,22 @@
-"""What a camera looks at: the path that it follows, and the window of a slab that it shows."""
+"""What a camera looks at: its smooth path, which follows bodies or a domain that moves by whole
+cells, and the window of a slab that it shows."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.ndimage import gaussian_filter1d
 
 from flowborne.kernels.arrays import Array
 from flowborne.shapes.shape import DIRECTIONS
 from flowborne.view.fields import SAMPLES
 from flowborne.view.outlines import Outlines, flesh_loops
-from flowborne.view.paths import domain_shown, smoothed
 from flowborne.view.run import Run
 from flowborne.view.shot import Shot
+
+SMOOTHING = 0.4
+"""Standard deviation of the Gaussian that smooths the camera's path, s."""
 
 MAX_WHOLE_DOMAIN = 6.0
 """Largest fluid domain that is shown whole, in sizes of the volume swept by the bodies."""
@@ -58,8 +62,15 @@ def radius_of(seen: Array) -> float:
 
 
 def swept(run: Run, geoms: Sequence[int]) -> Array:
-    """(frames, n, 3) m, outermost points of geometries and of all flesh; the origin if none."""
-    points = [] if run.flesh is None else [_flesh_points(run)]
+    """(frames, n, 3) m, outermost points of geometries and of all flesh; the origin if none.
+
+    Of flesh they are the vertices that are in any frame the farthest in one of 26 directions.
+    """
+    points = []
+    if run.flesh is not None:
+        vertices = run.every("flesh_vertices")
+        farthest = [np.argmax(frame @ DIRECTIONS.T, axis=0) for frame in vertices]
+        points.append(vertices[:, np.unique(farthest)])
     points += [_geom_points(run, geoms)] if geoms else []
     return np.concatenate(points, axis=1) if points else np.zeros((len(run), 1, 3))
 
@@ -74,14 +85,7 @@ def _geom_points(run: Run, geoms: Sequence[int]) -> Array:
     return np.concatenate(points, axis=1)
 
 
-def _flesh_points(run: Run) -> Array:
-    """(frames, k, 3) m, vertices that are in any frame the farthest in one of 26 directions."""
-    vertices = run.every("flesh_vertices")
-    farthest = [np.argmax(frame @ DIRECTIONS.T, axis=0) for frame in vertices]
-    return vertices[:, np.unique(farthest)]
-
-
-def windows(run: Run, outlines: Outlines, shot: Shot, aspect: float | None) -> Array:
+def windows(run: Run, shot: Shot, aspect: float | None = None) -> Array:
     """(frames, 4) m, (x0, x1, y0, y1) that is shown in each frame; all of one size.
 
     aspect  height over width that it must have, if any
@@ -98,10 +102,13 @@ def windows(run: Run, outlines: Outlines, shot: Shot, aspect: float | None) -> A
     if camera.target is None and camera.distance is None:
         whole = _whole_domain(run, shot, radius)
         if whole is None and run.grid is None and camera.follow == "bodies":
-            whole = _swept_area(run, outlines)
+            whole = _swept_area(run)
         if whole is not None:
             centre, half = whole
-            return _around(centre, _enlarged(half, aspect))
+            if aspect is not None:
+                width = max(half[0], half[1] / aspect)
+                half = np.array([width, aspect * width])
+            return _around(centre, half)
     height = ROOM * radius
     if camera.distance is not None:
         height = camera.distance * np.tan(0.5 * np.radians(camera.lens))
@@ -139,8 +146,9 @@ def _whole_domain(run: Run, shot: Shot, radius: float) -> tuple[Array, Array] | 
     return centre, half
 
 
-def _swept_area(run: Run, outlines: Outlines) -> tuple[Array, Array]:
+def _swept_area(run: Run) -> tuple[Array, Array]:
     """Centres (frames, 2) and half sides (2,) m of the area that bodies sweep, with a margin."""
+    outlines = Outlines(run)
     placed = [
         outline
         for state in run.sampled(SAMPLES)
@@ -155,9 +163,70 @@ def _swept_area(run: Run, outlines: Outlines) -> tuple[Array, Array]:
     return np.broadcast_to(middle, (len(run), 2)), half
 
 
-def _enlarged(half: Array, aspect: float | None) -> Array:
-    """Half sides (2,) that contain `half` and have an aspect, if one is given."""
-    if aspect is None:
-        return half
-    width = max(half[0], half[1] / aspect)
-    return np.array([width, aspect * width])
+def smoothed(path: Array, frames_per_second: float) -> Array:
+    """(frames, 3) smoothed `path` (frames, 3), m.
+
+    The path is extrapolated beyond its ends, so that a steady walk keeps its speed to the end.
+    Frames with non-finite numbers keep the last finite position.
+    """
+    good = np.flatnonzero(np.isfinite(path).all(axis=1))
+    if good.size == 0:
+        return np.zeros_like(path)
+    # the extended path has a period of 2 n frames, damped by exp(-5 deviation^2 / n^2)
+    deviation = min(SMOOTHING * frames_per_second, 2.0 * good.size)
+    pad = int(4.0 * deviation) + 1
+    padded = np.pad(path[good], ((pad, pad), (0, 0)), mode="reflect", reflect_type="odd")
+    smooth = gaussian_filter1d(padded, deviation, axis=0)[pad:-pad]
+    last = np.searchsorted(good, np.arange(len(path)), side="right") - 1
+    return np.asarray(smooth[np.maximum(last, 0)])
+
+
+def window_path(run: Run) -> Array:
+    """(frames, 3) m, displacement of the fluid's domain from its start, without jumps by cells.
+
+    It is 0 without a fluid.
+    The domain moves when what it follows has moved by a cell. From one move to the next the path is
+    straight, and after the last one it goes on by at most a cell.
+    """
+    path = np.zeros((len(run), 3))
+    if not run.window_axes:
+        return path
+    grid = run.grid_at({})
+    frames, moved = np.arange(len(run)), run.origins() - grid.origin
+    for axis in run.window_axes:
+        known = np.append(0, 1 + np.flatnonzero(np.diff(moved[:, axis])))
+        path[:, axis] = np.interp(frames, known, moved[known, axis])
+        if len(known) > 1:
+            speed = np.diff(moved[known[-2:], axis]) / np.diff(known[-2:])
+            beyond = speed * np.maximum(frames - known[-1], 0)
+            path[:, axis] += np.clip(beyond, -grid.spacing, grid.spacing)
+    return smoothed(path, run.frames_per_second)
+
+
+def domain_shown(run: Run, *, from_world: bool) -> tuple[Array, Array, Array]:
+    """Lower and upper corner (3,) of the fluid's domain at the start, and its path (frames, 3), m.
+
+    from_world  all that it is in during the run, which does not move
+    """
+    grid = run.grid_at({})
+    low, size = np.array(grid.origin), np.array(grid.upper) - grid.origin
+    if not from_world:
+        return low, low + size, window_path(run)
+    origins = run.origins()
+    return origins.min(axis=0), origins.max(axis=0) + size, np.zeros((len(run), 3))
+
+
+def through_window(run: Run, focus: Array) -> Array:
+    """(frames, 3) m, `focus`, or the middle of a moving domain along axes on which it gets out."""
+    found = focus.copy()
+    if run.window_axes:
+        grid, origins = run.grid_at({}), run.origins()
+        size = grid.spacing * np.array(grid.shape)
+        middle = grid.origin + 0.5 * size + window_path(run)
+        for axis in run.window_axes:
+            inside = (focus[:, axis] > origins[:, axis]) & (
+                focus[:, axis] < origins[:, axis] + size[axis]
+            )
+            if not inside.all():
+                found[:, axis] = middle[:, axis]
+    return found

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import combinations, product
+
 import numpy as np
 
 from flowborne.kernels.arrays import Array
@@ -40,25 +42,27 @@ MIN_CAMERA_PATH = 0.06
 """Extent of the camera's path above which there are marks, in smaller sides of the view."""
 
 
-def arrow(tail: Array, vector: Array, width: float) -> Array:
-    """(7, 2) corners of an arrow from `tail` (2,) along `vector` (2,) with a shaft `width` wide.
+def flat_arrows(tails: Array, vectors: Array, width: float) -> Array:
+    """(..., 7, 2) corners of arrows from `tails` (..., 2) along `vectors` (..., 2).
 
     The head of an arrow shorter than its head is scaled down. The tip is corner 3.
-    raises  ValueError if the vector is 0
+
+    width   of the shafts
+    raises  ValueError if a vector is 0
     """
-    length = float(np.hypot(*vector))
-    if not length > 0.0:
+    length = np.hypot(vectors[..., :1], vectors[..., 1:])
+    if not (length > 0.0).all():
         raise ValueError("an arrow of no length has no direction")
-    along = np.asarray(vector, float) / length
-    across = np.array([-along[1], along[0]])
-    width = min(width, length / HEAD_LENGTH)
-    neck = length - HEAD_LENGTH * width
-    half, wing = 0.5 * width, 0.5 * HEAD_WIDTH * width
+    along = vectors / length
+    across = np.stack([-along[..., 1], along[..., 0]], axis=-1)
+    shaft = np.minimum(width, length / HEAD_LENGTH)
+    neck, half, wing = length - HEAD_LENGTH * shaft, 0.5 * shaft, 0.5 * HEAD_WIDTH * shaft
+    zero = np.zeros_like(shaft)
     outline = [
-        (0.0, half), (neck, half), (neck, wing), (length, 0.0),
-        (neck, -wing), (neck, -half), (0.0, -half),
+        (zero, half), (neck, half), (neck, wing), (length, zero),
+        (neck, -wing), (neck, -half), (zero, -half),
     ]  # fmt: skip
-    return np.asarray(tail, float) + np.array([a * along + b * across for a, b in outline])
+    return np.stack([tails + (a * along + b * across) for a, b in outline], axis=-2)
 
 
 def round_number(value: float) -> float:
@@ -80,11 +84,19 @@ class Forces:
     def __init__(self, run: Run, side: float) -> None:
         """`side`: smaller side of the view, m."""
         self._axes = 2 if run.is_slab else 3
-        self._bodies = _drawn_bodies(run)
+        carrying = () if run.flesh is None else run.flesh.bodies
+        drawn = sorted({*carrying, *(geom.body for geom in run.geoms)})
+        # the world is among them only if it is the only one
+        self._bodies = [body for body in drawn if body > 0] or drawn
         self.most = len(self._bodies)
         self.reach = LARGE_FORCE_LENGTH * side
-        large = self._large(run)
-        self.large = large if large > _rounding(run, side) else 0.0
+        self.large = 0.0
+        if self._bodies:
+            forces = run.every("fluid_force")[:, self._bodies, : self._axes]
+            sizes = np.linalg.norm(forces, axis=-1).max(axis=1)
+            finite = sizes[np.isfinite(sizes) & (sizes > 0.0)]
+            large = float(np.percentile(finite, LARGE_FORCE_PERCENTILE)) if finite.size else 0.0
+            self.large = large if large > _rounding(run, side) else 0.0
         self.unit = "N/m" if run.is_slab else "N"
 
     def arrows(self, state: State, pixel: float) -> list[tuple[int, Array, Array]]:
@@ -105,14 +117,6 @@ class Forces:
             arrows.append((body, tail, min(1.0, MAX_FORCE_LENGTH * self.reach / length) * vector))
         return arrows
 
-    def _large(self, run: Run) -> float:
-        if not self._bodies:
-            return 0.0
-        forces = run.every("fluid_force")[:, list(self._bodies), : self._axes]
-        sizes = np.linalg.norm(forces, axis=-1).max(axis=1)
-        finite = sizes[np.isfinite(sizes) & (sizes > 0.0)]
-        return float(np.percentile(finite, LARGE_FORCE_PERCENTILE)) if finite.size else 0.0
-
 
 def _rounding(run: Run, side: float) -> float:
     """Force on bodies in a fluid at rest that comes from rounding, N (N/m in a slab).
@@ -122,13 +126,6 @@ def _rounding(run: Run, side: float) -> float:
     duration = (len(run) - 1) / run.frames_per_second
     mass = run.density * side ** (2 if run.is_slab else 3)
     return 2.0 * ROUNDING_SHIFT * mass * side / duration**2 if duration > 0.0 else 0.0
-
-
-def _drawn_bodies(run: Run) -> tuple[int, ...]:
-    """Bodies that are drawn; the world is among them only if it is the only one."""
-    carrying = () if run.flesh is None else run.flesh.bodies
-    drawn = sorted({*carrying, *(geom.body for geom in run.geoms)})
-    return tuple(body for body in drawn if body > 0) or tuple(drawn)
 
 
 def camera_moves(path: Array, side: float) -> bool:
@@ -160,3 +157,10 @@ def motes(count: int, around: Array, reach: float) -> Array:
     points = 2.0 * reach * np.random.default_rng(1).random((count, 3))
     offset = points - around
     return np.asarray(around + offset - 2.0 * reach * np.round(offset / (2.0 * reach)))
+
+
+def box_edges(low: Array, high: Array) -> Array:
+    """(12, 2, 3) ends of the edges of a box between two corners (3,)."""
+    corners = np.array(list(product(*zip(low, high, strict=True))))
+    pairs = combinations(corners, 2)
+    return np.array([(a, b) for a, b in pairs if np.count_nonzero(a != b) == 1])

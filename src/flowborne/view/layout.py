@@ -78,18 +78,19 @@ class Layout:
         return cls(width, height, Box(0, 0, width, height), None, ())
 
     @classmethod
-    def sized(cls, size: tuple[int, int], strips: int, *, bare: bool) -> Layout:
+    def sized(cls, size: tuple[int, ...], strips: int, *, bare: bool) -> Layout:
         """Layout of a picture of `size` pixels; if it is wide, strips are to the right of the map.
 
         bare    the map alone
         raises  ValueError if the size is too small for the map and its strips
         """
+        across, down = size
         if bare:
-            return cls(*size, Box(0, 0, *size), None, ())
-        wide = strips > 0 and size[0] > WIDE * size[1]
+            return cls(across, down, Box(0, 0, across, down), None, ())
+        wide = strips > 0 and across > WIDE * down
         width = WIDE_WIDTH if wide else MAP_WIDTH + 2 * MARGIN
-        scale = size[0] / width
-        height = size[1] / scale
+        scale = across / width
+        height = down / scale
         inner = width - 2 * MARGIN
         if wide:
             map_width, map_height = round(WIDE_MAP * inner), int(height) - HEADER - LEGEND
@@ -104,7 +105,7 @@ class Layout:
             cramped = False
         if map_height < MIN_MAP or cramped:
             raise ValueError(
-                f"a picture of {size[0]} by {size[1]} pixels has no room for its plots; make it "
+                f"a picture of {across} by {down} pixels has no room for its plots; make it "
                 "higher, or drop them with plots=false"
             )
         map_box = Box(MARGIN, HEADER, map_width, map_height)
@@ -118,11 +119,6 @@ class Layout:
         # a little more than the length, because a canvas truncates fractions of pixels
         inches = ((round(width) + 0.01) / dots, (round(height) + 0.01) / dots)
         return Figure(figsize=inches, dpi=dots)
-
-    @property
-    def pixels(self) -> tuple[int, int]:
-        """Width and height of the picture."""
-        return round(self.width * self.scale), round(self.height * self.scale)
 
     def axes(self, figure: Figure, box: Box) -> Axes:
         """New axes at `box`."""

@@ -1,9 +1,9 @@
-"""The map of a picture, which shows the run itself: of a slab from above, or of space by VTK."""
+"""The map of a picture, which shows the run itself, of a slab; it is seen from above."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -15,51 +15,18 @@ from PIL import Image
 
 from flowborne.kernels.arrays import Array
 from flowborne.view import style
-from flowborne.view.fields import Legend, Scale, faded, field_of, over
+from flowborne.view.fields import FieldVortices, faded, field_of, over
 from flowborne.view.framing import windows
-from flowborne.view.glyphs import SHAFT_WIDTH, Forces, arrow, camera_moves, crosses
+from flowborne.view.glyphs import SHAFT_WIDTH, Forces, camera_moves, crosses, flat_arrows
 from flowborne.view.outlines import Outlines, flesh_loops
 from flowborne.view.run import Run, State
 from flowborne.view.shot import Shot
-from flowborne.view.space.camera import camera_of
-from flowborne.view.space.opengl import off_screen
-from flowborne.view.space.visible import visible_of
-
-if TYPE_CHECKING:
-    from flowborne.view.space.stage import Stage
 
 ROUNDING = 1e-6
 """Share of a pixel that an image may lack and still fills it."""
 
 WIND_ROWS = 9
 """Rows of arrows that show a wind, along the map's smaller side."""
-
-
-class Map(Protocol):
-    """The part of a picture that shows the run itself.
-
-    width   m across the map, at the bodies
-    aspect  height over width
-    forces  the scale of the arrows of forces
-    """
-
-    width: float
-    aspect: float
-    forces: Forces
-    legend: Legend
-    scale: Scale | None
-
-    def draw_on(self, axes: Axes, pixels: int) -> Sequence[Artist]:
-        """Draw what is fixed in `axes`, `pixels` wide at scale 1; returns the moving artists."""
-        ...
-
-    def show(self, number: int, state: State) -> None:
-        """Update the moving artists to the `number`-th state."""
-        ...
-
-    def close(self) -> None:
-        """Release all resources besides memory; nothing can be drawn afterwards."""
-        ...
 
 
 class MapImage(Artist):
@@ -135,7 +102,10 @@ class MapImage(Artist):
 class MapSlab:
     """Map of a slab from above: its fluid, its bodies and the forces on them.
 
-    views  (frames, 4) m, (x0, x1, y0, y1) of each frame
+    views   (frames, 4) m, (x0, x1, y0, y1) of each frame
+    width   m across the map
+    aspect  height over width
+    forces  the scale of the arrows of forces
     """
 
     def __init__(self, run: Run, shot: Shot, aspect: float | None = None) -> None:
@@ -143,9 +113,11 @@ class MapSlab:
         self.run = run
         self._shot = shot
         self._shown = [n for n, geom in enumerate(run.geoms) if shot.bones or not geom.covered]
-        self._field = field_of(run, shot)
+        field = field_of(run, shot)
+        assert not isinstance(field, FieldVortices)
+        self._field = field
         self._outlines = Outlines(run)
-        self.views = windows(run, self._outlines, shot, aspect)
+        self.views = windows(run, shot, aspect)
         x0, x1, y0, y1 = self.views[0]
         self.width = float(x1 - x0)
         self.aspect = float((y1 - y0) / (x1 - x0))
@@ -156,7 +128,7 @@ class MapSlab:
         self.scale = None if self._field is None else self._field.scale
 
     def draw_on(self, axes: Axes, pixels: int) -> Sequence[Artist]:
-        """Draw what is fixed in `axes`, `pixels` wide; returns the moving artists."""
+        """Draw what is fixed in `axes`, `pixels` wide at scale 1; returns the moving artists."""
         self._pixel = self.width / pixels
         self._axes = axes
         self._look(0)
@@ -165,7 +137,7 @@ class MapSlab:
         if self._field is not None:
             self._water = MapImage(axes)
             moving.append(self._water)
-        elif self.run.wind.any():
+        elif self.run.grid is None and self.run.wind.any():
             axes.add_collection(self._wind)
             moving.append(self._wind)
         self._marks: LineCollection | None = None
@@ -201,9 +173,9 @@ class MapSlab:
             (x0, y0, _), (x1, y1, _) = grid.origin, grid.upper
             self._water.image = image if self._shot.transparent else over(image, self._shot.colour)
             self._water.extent = (x0, x1, y0, y1)
-        elif self.run.wind.any():
+        elif self.run.grid is None and self.run.wind.any():
             corner, wind = self.views[0, [0, 2]], self.run.wind.sum(axis=0)[:2]
-            self._wind.set_verts(wind_arrows(self.views[number], corner, wind))
+            self._wind.set_verts(list(wind_arrows(self.views[number], corner, wind)))
         if self._marks is not None:
             x0, x1, y0, y1 = self.views[number]
             self._marks.set_segments(
@@ -213,10 +185,11 @@ class MapSlab:
         self._bodies.set_verts([outlines[n] for n in self._shown])
         loops = flesh_loops(self.run, state)
         # one path of all loops, so that holes in the flesh stay empty
-        self._flesh.set_paths([Path.make_compound_path(*_closed(loops))] if loops else [])
+        closed = [Path(np.concatenate([loop, loop[:1]]), closed=True) for loop in loops]
+        self._flesh.set_paths([Path.make_compound_path(*closed)] if loops else [])
         width = SHAFT_WIDTH * self._pixel
         arrows = self.forces.arrows(state, self._pixel)
-        self._arrows.set_verts([arrow(tail, vector, width) for _, tail, vector in arrows])
+        self._arrows.set_verts([flat_arrows(tail, vector, width) for _, tail, vector in arrows])
 
     def close(self) -> None:
         """A slab has no resources to release."""
@@ -224,10 +197,6 @@ class MapSlab:
     def _look(self, number: int) -> None:
         x0, x1, y0, y1 = self.views[number]
         self._axes.set(xlim=(x0, x1), ylim=(y0, y1))
-
-
-def _closed(loops: list[Array]) -> list[Path]:
-    return [Path(np.concatenate([loop, loop[:1]]), closed=True) for loop in loops]
 
 
 def faded_axes(run: Run, views: Array) -> tuple[int, ...]:
@@ -245,10 +214,10 @@ def faded_axes(run: Run, views: Array) -> tuple[int, ...]:
     )
 
 
-def wind_arrows(view: Array, corner: Array, wind: Array) -> list[Array]:
-    """Grid of arrows along `wind` (2,) in the window `view`; odd rows are shifted by half.
+def wind_arrows(view: Array, corner: Array, wind: Array) -> Array:
+    """(n, 7, 2) grid of arrows along `wind` (2,) in the window `view`.
 
-    The grid is fixed in the world.
+    The grid is fixed in the world; its odd rows are shifted by half.
 
     corner  (2,) m, of its lower left square
     """
@@ -257,54 +226,7 @@ def wind_arrows(view: Array, corner: Array, wind: Array) -> list[Array]:
     vector = 0.42 * spacing * wind / np.hypot(*wind)
     first = np.floor((np.array([x0, y0]) - corner) / spacing + 1e-6).astype(int)
     last = np.ceil((np.array([x1, y1]) - corner) / spacing - 1e-6).astype(int)
-    arrows = []
-    for row in range(first[1], last[1]):
-        for column in range(first[0], last[0]):
-            middle = corner + spacing * (np.array([column + 0.5 * (row % 2), row]) + 0.5)
-            arrows.append(arrow(middle - 0.5 * vector, vector, 0.035 * spacing))
-    return arrows
-
-
-class MapSpace:
-    """Map of space, drawn by VTK.
-
-    camera  of all frames
-    """
-
-    def __init__(self, run: Run, shot: Shot, aspect: float | None = None) -> None:
-        """`aspect`: required height over width of the map, if any."""
-        self.run = run
-        self._shot = shot
-        self.camera = camera_of(run, shot, aspect)
-        self.width, self.aspect = self.camera.width, self.camera.aspect
-        self.forces = Forces(run, min(self.camera.width, self.camera.height))
-        self._visible = visible_of(run, shot)
-        self.legend: Legend = () if self._visible is None else self._visible.legend
-        self.scale: Scale | None = None if self._visible is None else self._visible.scale
-        self._stage: Stage | None = None
-
-    def draw_on(self, axes: Axes, pixels: int) -> Sequence[Artist]:
-        """Set the stage; returns the artist of its image in `axes`, `pixels` wide at scale 1.
-
-        raises  ValueError if three dimensions cannot be drawn on this machine
-        """
-        self._image = MapImage(axes)
-        plotter = off_screen(*self._image.pixels)
-        # imports VTK, which off_screen has checked
-        from flowborne.view.space.stage import Stage
-
-        pixel = self.width / pixels
-        self._stage = Stage(
-            plotter, self.run, self.camera, self.forces, self._visible, pixel, self._shot
-        )
-        return [self._image]
-
-    def show(self, number: int, state: State) -> None:
-        """Update the image to the `number`-th state."""
-        assert self._stage is not None
-        self._image.image = self._stage.image(number, state)
-
-    def close(self) -> None:
-        """Close VTK's window; nothing can be drawn afterwards."""
-        if self._stage is not None:
-            self._stage.close()
+    columns, rows = (np.arange(a, b) for a, b in zip(first, last, strict=True))
+    j, i = (index.ravel() for index in np.meshgrid(rows, columns, indexing="ij"))
+    middle = corner + spacing * (np.stack([i + 0.5 * (j % 2), j], axis=1) + 0.5)
+    return flat_arrows(middle - 0.5 * vector, vector, 0.035 * spacing)

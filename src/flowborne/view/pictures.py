@@ -5,6 +5,8 @@ What does not change from frame to frame is drawn once; a frame redraws only the
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
@@ -17,12 +19,23 @@ from numpy.typing import NDArray
 
 from flowborne.kernels.arrays import Array
 from flowborne.view import style
-from flowborne.view.glyphs import SHAFT_WIDTH, arrow, round_number
+from flowborne.view.glyphs import SHAFT_WIDTH, flat_arrows, round_number
 from flowborne.view.layout import MARGIN, Box, Layout
-from flowborne.view.maps import Map, MapSlab, MapSpace
-from flowborne.view.plots import LETTERS_IN_LEGEND, Strip, joint_curves, shortened, strip_curves
+from flowborne.view.maps import MapSlab
+from flowborne.view.plots import (
+    LETTERS_IN_LEGEND,
+    Strip,
+    joint_curves,
+    shortened,
+    signed,
+    strip_curves,
+)
 from flowborne.view.run import Run
 from flowborne.view.shot import Shot
+from flowborne.view.space.opengl import import_renderer
+
+if TYPE_CHECKING:
+    from flowborne.view.space.stage import MapSpace
 
 FIGURE_SPACE = "\u2007"
 """As wide as a digit, so that text does not move when its numbers change."""
@@ -54,13 +67,12 @@ class Picture:
         self.run = run
         self.shot = shot = run.shot if shot is None else shot
         curves = strip_curves(run) if shot.plots else []
-        kind = MapSlab if run.is_slab else MapSpace
         if shot.size is not None:
             self.layout = Layout.sized(shot.size, len(curves), bare=not shot.plots)
             box = self.layout.map
-            self.map: Map = kind(run, shot, box.height / box.width)
+            self.map = _map_of(run, shot, box.height / box.width)
         else:
-            self.map = kind(run, shot)
+            self.map = _map_of(run, shot)
             aspect = self.map.aspect
             self.layout = Layout.of(aspect, len(curves)) if shot.plots else Layout.bare(aspect)
         self._metres = self.map.width / self.layout.map.width
@@ -126,7 +138,6 @@ class Picture:
         return clock
 
     def _draw_legend(self, axes: Axes, box: Box) -> None:
-        """Draw the scales of length, force and colour in a row below the map."""
         width, height = box.width, box.height
         axes.set(xlim=(0, width), ylim=(0, height))
         axes.axis("off")
@@ -143,7 +154,7 @@ class Picture:
             x = _write(axes, x + 16, middle, name)
         if self.map.scale is not None:
             colours, low, high, name = self.map.scale
-            words = f"{name}   {_signed(low)}"
+            words = f"{name}   {signed(low)}"
             right, half = width - 60, 5
             left = min(max(width - 260, x + _width(axes, words) + 8), right - MIN_SCALE)
             axes.imshow(
@@ -153,7 +164,7 @@ class Picture:
                 interpolation="bilinear",
             )
             axes.set(xlim=(0, width), ylim=(0, height))
-            _write(axes, right + 8, middle, _signed(high))
+            _write(axes, right + 8, middle, signed(high))
             _write(axes, left - 8, middle, words, "right")
 
     def _bar(self, most: float) -> tuple[float, float]:
@@ -193,7 +204,7 @@ class Picture:
         forces = self.map.forces
         force = round_number(forces.large)
         pixels = force / forces.large * forces.reach / self._metres
-        key = arrow(np.array([x, middle]), np.array([pixels, 0.0]), SHAFT_WIDTH)
+        key = flat_arrows(np.array([x, middle]), np.array([pixels, 0.0]), SHAFT_WIDTH)
         axes.add_collection(
             PolyCollection([key], facecolors=style.FORCE, edgecolors=style.EDGE, linewidths=0.8)
         )
@@ -212,6 +223,15 @@ class Picture:
         return (4 * FIGURE_SPACE).join([*words, f"t = {time:.2f} s"])
 
 
+def _map_of(run: Run, shot: Shot, aspect: float | None = None) -> MapSlab | MapSpace:
+    if run.is_slab:
+        return MapSlab(run, shot, aspect)
+    import_renderer()
+    from flowborne.view.space.stage import MapSpace
+
+    return MapSpace(run, shot, aspect)
+
+
 def _bar_outline(left: float, middle: float, pixels: float, size: float) -> Array:
     """(12, 2) outline of a bar with ticks at its ends."""
     thin, tick, right = 1.0 * size, 4.5 * size, left + pixels
@@ -222,12 +242,7 @@ def _bar_outline(left: float, middle: float, pixels: float, size: float) -> Arra
     return np.concatenate([upper, upper[::-1] * [1.0, -1.0]]) + np.array([0.0, middle])
 
 
-def _signed(value: float) -> str:
-    return f"{value:.2g}".replace("-", "−")
-
-
 def _width(axes: Axes, words: str) -> float:
-    """Width of a text in a legend."""
     text = axes.text(0.0, 0.0, words, fontsize=8.5)
     box = text.get_window_extent().transformed(axes.transData.inverted())
     text.remove()

@@ -49,43 +49,25 @@ def joint_curves(run: Run) -> tuple[str, dict[str, Array]]:
     return "", {}
 
 
-def objective_curve(run: Run) -> Array | None:
-    """The objective of the last decision in every frame; None without an objective."""
-    values = run.history.get("objective")
-    return None if values is None or not np.isfinite(values).any() else values
-
-
-def _terms(run: Run) -> list[str]:
-    """Columns of the objective's terms."""
-    return [column for column in run.history if column.startswith("measured_")]
-
-
-def effort_curves(run: Run) -> dict[str, Array]:
-    """Joint or joints -> effort after every frame, of objectives that name the joints.
-
-    Empty if such an effort is the whole objective.
-    """
-    if len(_terms(run)) < 2:
-        return {}
-    named = {
-        column.removeprefix(EFFORT).replace("_", " "): values
-        for column, values in run.history.items()
-        if column.startswith(EFFORT)
-    }
-    return dict(list(named.items())[:MAX_CURVES])
-
-
 def strip_curves(run: Run) -> list[tuple[str, dict[str, Array]]]:
-    """(title, name -> values) of every strip of a run."""
+    """(title, name -> values) of every strip of a run.
+
+    They are the objective of the last decision in every frame, if there is one; the efforts of
+    objectives that name their joints, unless such an effort is the whole objective; and the joints.
+    """
     strips: list[tuple[str, dict[str, Array]]] = []
-    objective = objective_curve(run)
-    if objective is not None:
-        terms = [column.removeprefix("measured_").replace("_", " ") for column in _terms(run)]
-        title = f"objective: {terms[0]}" if len(terms) == 1 else "objective"
-        strips.append((title, {"": objective}))
-    efforts = effort_curves(run)
+    terms = [column for column in run.history if column.startswith("measured_")]
+    objective = run.history.get("objective")
+    if objective is not None and np.isfinite(objective).any():
+        only = terms[0].removeprefix("measured_").replace("_", " ") if len(terms) == 1 else ""
+        strips.append((f"objective: {only}" if only else "objective", {"": objective}))
+    efforts = {
+        column.removeprefix(EFFORT).replace("_", " "): run.history[column]
+        for column in terms
+        if column.startswith(EFFORT) and len(terms) > 1
+    }
     if efforts:
-        strips.append(("effort (N m s)", efforts))
+        strips.append(("effort (N m s)", dict(list(efforts.items())[:MAX_CURVES])))
     title, joints = joint_curves(run)
     if joints:
         strips.append((title, joints))
@@ -134,6 +116,11 @@ def shortened(name: str, letters: int) -> str:
         return name
     tail = (letters - 1) // 2
     return f"{name[: letters - 1 - tail]}…{name[-tail:]}"
+
+
+def signed(value: float) -> str:
+    """A number at the end of a colour scale, with a true minus."""
+    return f"{value:.2g}".replace("-", "−")
 
 
 def strip_style(axes: Axes) -> None:
@@ -273,40 +260,32 @@ def plot_courses(strips: dict[str, dict[str, tuple[Array, Array]]], path: Path) 
     _save(figure, path)
 
 
-@dataclass(frozen=True)
-class Points:
-    """Points of a plot; nan in either coordinate leaves one out.
-
-    x, y      (n,)
-    x_bar     (n,) half widths of error bars along x; None without
-    y_bar     (n,) along y
-    """
-
-    x: Array
-    y: Array
-    x_bar: Array | None = None
-    y_bar: Array | None = None
-
-
 def plot_points(
-    points: Points, labels: tuple[str, str], front: Integers, path: Path | str | IO[bytes]
+    x: Array,
+    y: Array,
+    bars: tuple[Array | None, Array | None],
+    labels: tuple[str, str],
+    front: Integers,
+    path: Path | str | IO[bytes],
 ) -> None:
     """Plot one number of many runs against another.
 
+    x, y    (n,); nan in either leaves a point out
+    bars    (n,) half widths of error bars along x and y; None without
     labels  of the axes x and y
     front   indices of points to connect, in the order of their x
     path    .png, .svg or .pdf, overwritten; or an open file, which becomes SVG
     """
     figure, (axes,) = _figure(1, (5.2, 3.6))
-    ordinary = np.setdiff1d(np.arange(len(points.x)), front)
-    best = front[np.argsort(points.x[front], kind="stable")]
+    ordinary = np.setdiff1d(np.arange(len(x)), front)
+    best = front[np.argsort(x[front], kind="stable")]
     for rows, colour, line in ((ordinary, style.CURVES[1], ""), (best, style.CURVES[0], "-")):
-        bars = [None if bar is None else bar[rows] for bar in (points.x_bar, points.y_bar)]
+        x_bar, y_bar = (None if bar is None else bar[rows] for bar in bars)
         axes.errorbar(
-            points.x[rows],
-            points.y[rows],
-            bars[1],
-            bars[0],
+            x[rows],
+            y[rows],
+            y_bar,
+            x_bar,
             fmt="o" + line,
             ms=4.0,
             lw=1.2,

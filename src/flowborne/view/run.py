@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sized
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -43,24 +43,6 @@ class Geom:
     covered: bool = False
 
 
-class Skin(Protocol):
-    """A surface that deforms from frame to frame.
-
-    triangles  (m, 3) vertices of each, outward
-    rgb        (3,) colour
-    """
-
-    @property
-    def triangles(self) -> NDArray[np.int64]: ...
-
-    @property
-    def rgb(self) -> Array: ...
-
-    def vertices(self, state: State) -> Array:
-        """(k, 3) m, in a state."""
-        ...
-
-
 @dataclass(frozen=True)
 class Flesh:
     """The skin of all flesh; its vertices are the `flesh_vertices` (k, 3) of a state.
@@ -72,16 +54,13 @@ class Flesh:
     triangles: NDArray[np.int64]
     bodies: tuple[int, ...]
 
-    @property
-    def rgb(self) -> Array:
-        return style.rgb(style.FLESH)
+    rgb = style.rgb(style.FLESH)
 
     def vertices(self, state: State) -> Array:
         """(k, 3) m, in a state."""
         return state["flesh_vertices"].astype(float)
 
 
-@dataclass(frozen=True)
 class CarriedSkin:
     """A skin of the model, bound to bodies.
 
@@ -94,13 +73,16 @@ class CarriedSkin:
     rgb        (3,) colour
     """
 
-    rest: Array
-    triangles: NDArray[np.int64]
-    bodies: NDArray[np.int64]
-    weights: Array
-    position: Array
-    rotation: Array
-    rgb: Array
+    def __init__(self, entry: dict[str, Any]) -> None:
+        """`entry`: of the skin in model.json. Raises ValueError if it lacks a vertex."""
+        _check_numbers(entry["triangles"], entry["vertices"], "vertex")
+        self.rest = np.asarray(entry["vertices"], float)
+        self.triangles = np.asarray(entry["triangles"], np.int64)
+        self.bodies = np.asarray(entry["bodies"], np.int64)
+        self.weights = np.asarray(entry["weights"], float)
+        self.position = np.asarray(entry["body_position"], float)
+        self.rotation = np.asarray(entry["body_rotation"], float)
+        self.rgb = np.asarray(entry["rgba"][:3], float)
 
     def vertices(self, state: State) -> Array:
         """(k, 3) m, in a state."""
@@ -108,6 +90,10 @@ class CarriedSkin:
         position = state["body_position"][self.bodies].astype(float)
         t = position - np.einsum("nij,nj->ni", R, self.position)
         return skinned(self.rest, self.weights, R, t)
+
+
+Skin = Flesh | CarriedSkin
+"""A surface that deforms from frame to frame."""
 
 
 class Run(OpenRun):
@@ -141,9 +127,9 @@ class Run(OpenRun):
             self.flesh = None
             if self.skin is not None:
                 self.flesh = Flesh(self.skin, tuple(model["flesh"]["bodies"]))
-            self.carried = tuple(_carried(entry) for entry in model.get("skins", ()))
+            self.carried = tuple(CarriedSkin(entry) for entry in model.get("skins", ()))
             self.sources = _sources(scene)
-            self.shot = Shot.of(scene.get("film", {}))
+            self.shot = Shot.model_validate(scene.get("film", {}))
             self.history = _plotted(RunFolder(self.folder).history)
             numbers = [*body_of.values(), *(geom.body for geom in self.geoms)]
             numbers += [body for skin in self.carried for body in skin.bodies]
@@ -177,7 +163,6 @@ class Run(OpenRun):
         return int(rows[0]) if rows.size else None
 
     def _check_geoms(self, positions: Array) -> None:
-        """Raise RunFolderError unless there is a position of each geometry."""
         if len(positions) != len(self.geoms):
             raise RunFolderError(
                 f"model.json of the run has {len(self.geoms)} geometries and its states "
@@ -202,19 +187,6 @@ def _geom(entry: dict[str, Any]) -> Geom:
     covered = bool(entry.get("covered", False))
     shape = shape_of(entry["type"], size, mesh)
     return Geom(shape, int(entry["body"]), rgba, covered)
-
-
-def _carried(entry: dict[str, Any]) -> CarriedSkin:
-    _check_numbers(entry["triangles"], entry["vertices"], "vertex")
-    return CarriedSkin(
-        np.asarray(entry["vertices"], float),
-        np.asarray(entry["triangles"], np.int64),
-        np.asarray(entry["bodies"], np.int64),
-        np.asarray(entry["weights"], float),
-        np.asarray(entry["body_position"], float),
-        np.asarray(entry["body_rotation"], float),
-        np.asarray(entry["rgba"][:3], float),
-    )
 
 
 def _sources(scene: dict[str, Any]) -> Array:

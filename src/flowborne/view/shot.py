@@ -1,60 +1,21 @@
-"""What a film shows of a run, and from which viewpoint: the table [film] of its scene."""
+"""What a film shows of a run: the table [film] of its scene, and what follows from it."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, Literal
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from flowborne.scenes.schema_film import FilmTable
 from flowborne.view import style
-
-Place = tuple[float, float, float]
 
 MAX_FRAMES = 1_000_000
 """Maximum number of frames of a film."""
 
 
-@dataclass(frozen=True)
-class CameraShot:
-    """The viewpoint; keys, units and defaults of [film.camera]."""
-
-    azimuth: float = -58.0
-    elevation: float = 13.0
-    lens: float = 26.0
-    distance: float | None = None
-    position: Place | None = None
-    target: Place | None = None
-    follow: str = "bodies"
-    orbit: float = 0.0
-
-
-@dataclass(frozen=True)
-class Shot:
-    """What a film shows; keys, units and defaults of [film]."""
-
-    field: Literal["dye", "vorticity", "speed", "pressure", "none"] = "vorticity"
-    bones: bool = False
-    plots: bool = True
-    scale_bar: bool = True
-    size: tuple[int, int] | None = None
-    frames_per_second: float | None = None
-    start: float | None = None
-    stop: float | None = None
-    background: str | None = None
-    camera: CameraShot = CameraShot()
-
-    @classmethod
-    def of(cls, table: Mapping[str, Any]) -> Shot:
-        """The shot of a validated table; missing keys have their defaults."""
-
-        def hashable(keys: Mapping[str, Any]) -> dict[str, Any]:
-            return {key: tuple(v) if isinstance(v, list) else v for key, v in keys.items()}
-
-        camera = CameraShot(**hashable(table.get("camera", {})))
-        return cls(**hashable(table) | {"camera": camera})
+class Shot(FilmTable):
+    """What a film shows."""
 
     @property
     def transparent(self) -> bool:

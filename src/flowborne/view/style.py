@@ -43,12 +43,8 @@ SPIN_RIGHT = ("#74ecff", "#2f8fff", "#15457f")
 SPEED = ("#0b1420", "#233a7a", "#6d3fa5", "#c94f7c", "#f7a14a", "#fff3b0")
 """Colours of speed from rest to the highest."""
 
-SUCTION, LEVEL, PUSH = (
-    ("#8ff0e4", "#1c8f96", "#123f54"),
-    "#101c2a",
-    ("#ffd9a0", "#cf7a2c", "#573423"),
-)
-"""Colours of pressure: below the mean from the lowest, at the mean, above it from the highest."""
+PRESSURE = ("#8ff0e4", "#1c8f96", "#123f54", "#101c2a", "#573423", "#cf7a2c", "#ffd9a0")
+"""Colours of pressure from the lowest to the highest; the middle one is at its mean."""
 
 
 def rgb(colour: str) -> Array:
@@ -77,15 +73,9 @@ def vorticity_table(count: int) -> Pixels:
     return _ramp(positions, np.column_stack([colours, opacity]), count)
 
 
-def speed_table(count: int) -> Pixels:
-    """(count, 3) colours from rest to the highest speed."""
-    return _ramp(np.linspace(-1.0, 1.0, len(SPEED)), _stack(SPEED), count)
-
-
-def pressure_table(count: int) -> Pixels:
-    """(count, 3) colours from the lowest pressure to the highest."""
-    colours = _stack((*SUCTION, LEVEL, *PUSH[::-1]))
-    return _ramp(np.linspace(-1.0, 1.0, len(colours)), colours, count)
+def number_table(colours: Sequence[str], count: int) -> Pixels:
+    """(count, 3) colours evenly along `colours`, from the lowest number to the highest."""
+    return _ramp(np.linspace(-1.0, 1.0, len(colours)), _stack(colours), count)
 
 
 def _stack(colours: Sequence[str]) -> Array:

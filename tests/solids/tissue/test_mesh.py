@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import pyvista as pv
 
-from flowborne.base.array_file import read_arrays
+from flowborne.base.given import read_arrays
 from flowborne.kernels.arrays import Array, Integers
 from flowborne.shapes.closing import is_closed
 from flowborne.solids.elements import measures, outer_surface, with_middles

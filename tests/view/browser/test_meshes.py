@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flowborne.view.browser.meshes import counter_clockwise, joined, nothing, padded, prism
+from flowborne.view.browser.meshes import counter_clockwise, prism, repeated
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 
@@ -35,16 +35,15 @@ def test_outline_is_turned_round_when_it_is_clockwise() -> None:
     assert np.array_equal(counter_clockwise(SQUARE[::-1]), SQUARE)
 
 
-def test_meshes_are_joined() -> None:
+def test_equal_meshes_are_one() -> None:
     first, second = prism([SQUARE], 0.0, 1.0), prism([SQUARE + 5.0], 0.0, 1.0)
-    vertices, faces = joined([first, second])
+    vertices, faces = repeated(np.array([first[0], second[0]]), first[1])
     assert np.array_equal(vertices[faces[len(first[1]) :]], second[0][second[1]])
-    assert len(joined([])[0]) == len(nothing()[0]) == 0
 
 
-def test_parts_that_are_added_have_no_size() -> None:
+def test_meshes_that_are_added_have_no_size() -> None:
     vertices, faces = prism([SQUARE], 0.0, 1.0)
-    more, added = padded((vertices, faces), 1, 3)
+    more, added = repeated(vertices[None], faces, 3)
     assert (len(more), len(added)) == (3 * len(vertices), 3 * len(faces))
     assert np.abs(areas(more, added)[len(faces) :]).max() == 0.0
-    assert padded((vertices, faces), 1, 1)[0] is vertices
+    assert np.array_equal(repeated(vertices[None], faces, 1)[0], vertices)

@@ -21,7 +21,6 @@ from flowborne.base.errors import SceneError
 from flowborne.cli.main import main
 from flowborne.runs.run_folder import RunFolder, RunFolderError
 from flowborne.runs.states import cell_velocity
-from flowborne.scenes.schema_film import FilmTable
 from flowborne.view import style
 from flowborne.view.browser.fluid import velocity_arrows
 from flowborne.view.browser.page import CSS
@@ -30,7 +29,6 @@ from flowborne.view.browser.surroundings import Surroundings
 from flowborne.view.browser.viewer import GrowingRun, Viewer, open_viewer
 from flowborne.view.browser.viewpoint import FilmView, Viewpoint, camera_text
 from flowborne.view.framing import windows
-from flowborne.view.outlines import Outlines
 from flowborne.view.run import Run
 from flowborne.view.shot import Shot
 
@@ -265,16 +263,16 @@ def test_camera_of_a_slab_gives_the_same_film(folder: Path) -> None:
     run = Run(folder)
     view = FilmView.of(run)
     keys = tomllib.loads(camera_text("run", view.first, True).split("```")[1][4:])["film"]
-    shot = Shot.of(FilmTable.model_validate(keys).model_dump(exclude_none=True))
-    seen = windows(run, Outlines(run), shot, None)[0]
-    wanted = windows(run, Outlines(run), run.shot, None)[0]
+    shot = Shot.model_validate(keys)
+    seen = windows(run, shot)[0]
+    wanted = windows(run, run.shot)[0]
     assert seen[2:] == pytest.approx(wanted[2:], abs=0.01)
 
 
 def test_camera_keys_are_those_of_a_scene() -> None:
     seen_from = Viewpoint(np.array([7.0, -2.5, 1.25]), np.array([0.1, 0.0, 0.9]), 26.0)
     keys = tomllib.loads(camera_text("run", seen_from, False).split("```")[1][4:])["film"]
-    camera = Shot.of(FilmTable.model_validate(keys).model_dump(exclude_none=True)).camera
+    camera = Shot.model_validate(keys).camera
     assert camera.position == (7.0, -2.5, 1.25)
     assert camera.target == (0.1, 0.0, 0.9)
     assert camera.lens == 26.0

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from flowborne.fluid.grid import Grid
+from flowborne.scenes.schema_film import CameraTable
 from flowborne.shapes.primitives import shape_of
 from flowborne.view.framing import swept
 from flowborne.view.run import Run
-from flowborne.view.shot import CameraShot, Shot
+from flowborne.view.shot import Shot
 from flowborne.view.space.camera import FILLED, FILLED_BY_FLUID, Camera, camera_of
 
 from .projecting import project
@@ -95,7 +96,7 @@ def test_a_fluid_is_seen_whole_unless_it_is_much_larger(run_of: Make, box_of_flu
 
 
 def shot_by(**camera: object) -> Shot:
-    return Shot(camera=CameraShot(**camera))  # type: ignore[arg-type]
+    return Shot(camera=CameraTable(**camera))  # type: ignore[arg-type]
 
 
 def test_the_maps_axes_are_a_frame_and_x_leads_to_the_right_and_nearer(run_of: Make) -> None:

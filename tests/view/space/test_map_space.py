@@ -13,13 +13,14 @@ import pytest
 
 import flowborne
 from flowborne.fluid.grid import Grid
+from flowborne.scenes.schema_film import CameraTable
 from flowborne.sim.running import RunOutcome
 from flowborne.view import style
 from flowborne.view.film import make_preview
-from flowborne.view.maps import MapSpace
 from flowborne.view.pictures import Picture
 from flowborne.view.run import Run
-from flowborne.view.shot import CameraShot, Shot
+from flowborne.view.shot import Shot
+from flowborne.view.space.stage import MapSpace
 from flowborne.view.space.surroundings import stands_on_ground
 
 from .projecting import project
@@ -154,7 +155,7 @@ def test_dye_glows_where_it_is(run_of: Make, box_of_fluid: Grid) -> None:
         [ball],
         np.zeros((2, 1, 3)),
         grid=box_of_fluid,
-        shot=Shot("dye", camera=CameraShot(distance=8.0)),
+        shot=Shot(field="dye", camera=CameraTable(distance=8.0)),
     )
     dye = np.zeros(box_of_fluid.shape, np.float32)
     dye[8:11, 3:7, 4:7] = 1.0

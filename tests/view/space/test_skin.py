@@ -26,20 +26,13 @@ from flowborne.solids.model import SolidModel
 from flowborne.solids.tissue.growth import Tissue, add_flesh
 from flowborne.solids.trajectories import JointCommand
 from flowborne.view import style
-from flowborne.view.maps import MapSpace
 from flowborne.view.pictures import Picture
 from flowborne.view.run import Flesh, Geom, Run
 from flowborne.view.space.camera import FILLED, camera_of
 from flowborne.view.space.lighting import KEY
 from flowborne.view.space.opengl import off_screen
-from flowborne.view.space.surfaces import (
-    Outside,
-    SkinSurface,
-    creased,
-    exit_distance,
-    mesh_of,
-    normals,
-)
+from flowborne.view.space.stage import MapSpace
+from flowborne.view.space.surfaces import Outside, SkinSurface, creased, exit_distance, normals
 from flowborne.view.space.surroundings import stands_on_ground
 from flowborne_validation.flesh_bars import bar_mesh
 
@@ -213,7 +206,7 @@ def test_bones_are_hidden_until_they_are_asked_for(arm: Path) -> None:
     assert [geom.covered for geom in run.geoms] == [True, True]
     with (
         closing(Picture(run)) as picture,
-        closing(Picture(run, shot=replace(run.shot, bones=True))) as inside,
+        closing(Picture(run, shot=run.shot.model_copy(update={"bones": True}))) as inside,
     ):
         at = pixel_of(picture, 2, lower)
         skin, bone = drawn(picture, 2)[at], drawn(inside, 2)[at]
@@ -230,7 +223,7 @@ def test_arrows_of_forces_start_on_the_skin(arm: Path) -> None:
     assert run.flesh is not None
     assert run.flesh.bodies == (1, 2)
     state = run.state(2)
-    skin = Outside(run.geoms, [mesh_of(geom) for geom in run.geoms], run.skins)
+    skin = Outside(run.geoms, run.skins)
     around = skin.around(state)
     for body in run.flesh.bodies:
         middle = state["fluid_centre"][body].astype(float)
@@ -296,7 +289,7 @@ def test_the_way_out_ends_where_the_line_first_leaves_the_skin() -> None:
 def test_a_part_of_a_body_outside_flesh_still_counts() -> None:
     places, triangles = ball(0.2)
     box = Geom(ShapeBox(np.array([0.5, 0.1, 0.1])), 1, np.ones(4))
-    skin = Outside([box], [mesh_of(box)], [Flesh(triangles, (1,))])
+    skin = Outside([box], [Flesh(triangles, (1,))])
     state = {
         "geom_position": np.zeros((1, 3)),
         "geom_rotation": np.eye(3)[None],

@@ -49,7 +49,7 @@ def geom(kind: str, size: tuple[float, float, float], body: int = 1) -> Geom:
 
 
 def skin_of(*geoms: Geom) -> Outside:
-    return Outside(geoms, [mesh_of(geom) for geom in geoms])
+    return Outside(geoms)
 
 
 @pytest.mark.parametrize(

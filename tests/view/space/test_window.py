@@ -10,19 +10,19 @@ import pytest
 from numpy.testing import assert_allclose
 
 from flowborne.fluid.grid import Grid
+from flowborne.scenes.schema_film import CameraTable
 from flowborne.view import style
-from flowborne.view.fields import side_weight
-from flowborne.view.maps import MapSpace
+from flowborne.view.fields import FieldDye, FieldVortices, side_weight
 from flowborne.view.pictures import Picture
 from flowborne.view.run import Run
-from flowborne.view.shot import CameraShot, Shot
+from flowborne.view.shot import Shot
 from flowborne.view.space.camera import FILLED_BY_FLUID, Camera, camera_of
+from flowborne.view.space.stage import MapSpace
 from flowborne.view.space.surroundings import water_of
-from flowborne.view.space.visible import VisibleDye, VisibleVortices
 
 from .projecting import project
+from .test_fields import turning
 from .test_map_space import drawn, of_hue, pixel_of
-from .test_visible import turning
 
 Make = Callable[..., Run]
 
@@ -52,7 +52,7 @@ def followed(run_of: Make, box_of_fluid: Grid, ball: tuple[str, tuple[float, ...
 
 
 def camera(run: Run, follow: str) -> Camera:
-    return camera_of(run, Shot(field="none", camera=CameraShot(follow=follow)))
+    return camera_of(run, Shot(field="none", camera=CameraTable(follow=follow)))
 
 
 def corners_of(run: Run, number: int) -> np.ndarray:
@@ -89,7 +89,7 @@ def test_dye_glows_where_it_is_and_the_box_is_around_it(
     dye = np.zeros(box_of_fluid.shape, np.float32)
     dye[8:11, 3:7, 4:7] = 1.0
     with_dye(run, dye)
-    run.shot = Shot("dye", camera=CameraShot(follow=follow, distance=12.0))
+    run.shot = Shot(field="dye", camera=CameraTable(follow=follow, distance=12.0))
     with closing(Picture(run)) as picture:
         assert isinstance(picture.map, MapSpace)
         for number in (0, 40):
@@ -98,8 +98,7 @@ def test_dye_glows_where_it_is_and_the_box_is_around_it(
             middle = np.array(grid.origin) + grid.spacing * np.array([9.5, 5.0, 5.5])
             row, column = np.argwhere(cyan).mean(axis=0)
             assert (row, column) == pytest.approx(pixel_of(picture, number, middle), abs=15.0)
-            assert picture.map._stage is not None
-            moved = [np.array(edge.position) for _, edge in picture.map._stage._edges]
+            moved = [np.array(edge.position) for _, edge in picture.map._edges]
             assert np.abs(moved - 0.2 * MOVED[number]).max() < 1.6 * 0.2
 
 
@@ -109,8 +108,8 @@ def test_dye_and_vortices_end_softly_at_the_sides(run: Run, box_of_fluid: Grid) 
     with_dye(run, state["scalar_dye"])
     run.sampled = lambda most: [state]  # type: ignore[method-assign]
     weight = side_weight(box_of_fluid.shape, (0, 1, 2))
-    assert_allclose(VisibleVortices(run).q(state), 4.0 * weight, rtol=1e-4)
-    smoke = VisibleDye(run).smoke(state)[1]
+    assert_allclose(FieldVortices(run).q(state), 4.0 * weight, rtol=1e-4)
+    smoke = FieldDye(run).smoke(state)[1]
     assert_allclose(smoke, weight, rtol=1e-5)
 
 

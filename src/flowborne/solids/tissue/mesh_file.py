@@ -16,9 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.base.array_file import read_arrays
 from flowborne.base.extras import optional
-from flowborne.base.given import read_file
+from flowborne.base.given import read_arrays, read_file
 from flowborne.solids.tissue.mesh import FleshMesh
 from flowborne.solids.tissue.mesh_run import READ, run_apart
 

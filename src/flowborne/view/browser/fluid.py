@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,15 +13,24 @@ from scipy.spatial.transform import Rotation
 from flowborne.fluid.grid import Array, Grid
 from flowborne.runs.states import cell_velocity
 from flowborne.view import style
-from flowborne.view.browser.meshes import Mesh, joined, nothing, show_mesh
+from flowborne.view.browser.meshes import Mesh, nothing, repeated, show_mesh
 from flowborne.view.browser.settings import Settings
-from flowborne.view.fields import NUMBERS, Field, FieldNumber, Legend, Scale, faded, field_of, over
-from flowborne.view.glyphs import arrow
+from flowborne.view.fields import (
+    Field,
+    FieldDye,
+    FieldNumber,
+    FieldVortices,
+    Legend,
+    Scale,
+    faded,
+    field_of,
+    over,
+)
+from flowborne.view.glyphs import flat_arrows
 from flowborne.view.run import Run, State
 from flowborne.view.shot import Shot
-from flowborne.view.space.fluid import VortexSurfaces
+from flowborne.view.space.fluid import vortex_surface
 from flowborne.view.space.lighting import scattered
-from flowborne.view.space.visible import VisibleDye, VisibleVortices
 from flowborne.view.style import Pixels
 
 if TYPE_CHECKING:
@@ -85,16 +93,16 @@ def velocity_arrows(grid: Grid, state: State, axis: int, coordinate: float, spee
     i, j = (index.ravel() for index in np.meshgrid(*picked, indexing="ij"))
     middle = np.array([grid.origin[side] for side in sides])
     middle = middle + grid.spacing * (np.stack([i, j], axis=1) + 0.5)
-    meshes = []
-    for n in np.flatnonzero(free & (share > MIN_SPEED)):
-        vector = spacing / speed / max(1.0, share[n]) * velocity[n]
-        corners = arrow(middle[n] - 0.5 * vector, vector, 0.09 * spacing)
-        # on both sides of the image
-        for side in (-ARROW_OFFSET, ARROW_OFFSET):
-            points = np.empty((7, 3))
-            points[:, list(sides)], points[:, axis] = corners, coordinate + side * spacing
-            meshes.append((points, ARROW))
-    return joined(meshes)
+    shown = free & (share > MIN_SPEED)
+    if not shown.any():
+        return nothing()
+    vectors = (spacing / speed / np.maximum(1.0, share))[:, None] * velocity
+    corners = flat_arrows((middle - 0.5 * vectors)[shown], vectors[shown], 0.09 * spacing)
+    # on both sides of the image
+    points = np.empty((len(corners), 2, 7, 3))
+    points[..., list(sides)] = corners[:, None]
+    points[..., axis] = coordinate + spacing * np.array([[-ARROW_OFFSET], [ARROW_OFFSET]])
+    return repeated(points.reshape(-1, 7, 3), ARROW)
 
 
 def enlarged(image: Pixels, side: int) -> Pixels:
@@ -124,7 +132,6 @@ class Fluid:
         self.toward = toward
         self._scene, self._run = scene, run
         self._fields: dict[str, Field | None] = {}
-        self._numbers: dict[str, FieldNumber] = {}
 
     def show(self, state: State, settings: Settings) -> None:
         """Show a state by the settings."""
@@ -132,41 +139,34 @@ class Fluid:
         if self._run.is_slab:
             self._show_slab(state, grid, settings)
         else:
-            self._show_dye(state, grid, settings.field == "dye")
-            self._show_vortices(state, grid, settings.field == "vorticity")
+            field = self._field(settings.field)
+            self._show_dye(state, grid, field if isinstance(field, FieldDye) else None)
+            self._show_vortices(state, grid, field if isinstance(field, FieldVortices) else None)
             self._show_slice(state, grid, settings)
         self._show_velocity(state, grid, settings)
 
     def legend(self, settings: Settings) -> tuple[Legend, Sequence[Scale]]:
         """(name, colour) of what is shown in its own colour, and the colour scales."""
-        if self._run.is_slab:
-            field = self._slab_field(settings.field)
-            if field is None:
-                return (), ()
-            return field.legend, () if field.scale is None else (field.scale,)
-        names: Legend = ()
-        if settings.field == "dye":
-            names = self._dye.legend
-        if settings.field == "vorticity":
-            names = self._vortices.legend
-        scale = None if settings.slice == "none" else self._number(settings.slice).scale
-        return names, () if scale is None else (scale,)
+        shown = [self._field(settings.field), self._field(settings.slice)]
+        names = [name for field in shown if field is not None for name in field.legend]
+        scales = [field.scale for field in shown if field is not None]
+        return names, [scale for scale in scales if scale is not None]
 
     def _show_slab(self, state: State, grid: Grid, settings: Settings) -> None:
-        field = self._slab_field(settings.field)
+        field = self._field(settings.field)
+        assert not isinstance(field, FieldVortices)
         image = np.zeros((1, 1, 4), np.uint8) if field is None else field.image(state)
         if self._run.window_axes:
             image = faded(image, self._run.window_axes)
         self._show_image(over(image, self._run.shot.colour), grid, 2, 0.0)
 
     def _show_slice(self, state: State, grid: Grid, settings: Settings) -> None:
-        if settings.slice == "none":
+        field = self._field(settings.slice)
+        if not isinstance(field, FieldNumber):
             self._scene.remove_by_name("/run/slice")
             return
         axis, coordinate = self._plane(grid, settings)
-        image = self._number(settings.slice).layer(
-            state, axis, (coordinate - grid.origin[axis]) / grid.spacing
-        )
+        image = field.layer(state, axis, (coordinate - grid.origin[axis]) / grid.spacing)
         self._show_image(image.swapaxes(0, 1), grid, axis, coordinate)
 
     def _plane(self, grid: Grid, settings: Settings) -> tuple[int, float]:
@@ -205,7 +205,9 @@ class Fluid:
         mesh = nothing()
         if settings.velocity:
             plane = self._plane(grid, settings)
-            mesh = velocity_arrows(grid, state, *plane, self._number("speed").limit)
+            speed = self._field("speed")
+            assert isinstance(speed, FieldNumber)
+            mesh = velocity_arrows(grid, state, *plane, speed.limit)
         show_mesh(
             self._scene,
             "/run/velocity",
@@ -217,11 +219,10 @@ class Fluid:
             receive_shadow=False,
         )
 
-    def _show_vortices(self, state: State, grid: Grid, visible: bool) -> None:
-        """Show one mesh for each sense of rotation."""
+    def _show_vortices(self, state: State, grid: Grid, vortices: FieldVortices | None) -> None:
         points, faces, warm = np.zeros((0, 3)), np.zeros((0, 3), int), np.zeros(0, bool)
-        if visible:
-            surface = self._surfaces.of(state, grid, self.toward)
+        if vortices is not None:
+            surface = vortex_surface(vortices, state, grid, self.toward, FINE)
             if surface.n_points:
                 points, faces = surface.points, surface.regular_faces
                 warm = surface.point_data["sense"][faces].mean(axis=1) > 0.0
@@ -239,9 +240,9 @@ class Fluid:
                 receive_shadow=False,
             )
 
-    def _show_dye(self, state: State, grid: Grid, visible: bool) -> None:
+    def _show_dye(self, state: State, grid: Grid, dye: FieldDye | None) -> None:
         """Show a Gaussian for each cell with dye, lit as smoke."""
-        smoke = cloud(grid, self._dye, state, self.toward) if visible else None
+        smoke = None if dye is None else cloud(grid, dye, state, self.toward)
         if smoke is None or not len(smoke[0]):
             self._scene.remove_by_name("/run/dye")
             return
@@ -254,31 +255,14 @@ class Fluid:
             opacities[:, None],
         )
 
-    @cached_property
-    def _dye(self) -> VisibleDye:
-        return VisibleDye(self._run)
-
-    @cached_property
-    def _vortices(self) -> VisibleVortices:
-        return VisibleVortices(self._run)
-
-    @cached_property
-    def _surfaces(self) -> VortexSurfaces:
-        return VortexSurfaces(self._vortices, FINE)
-
-    def _number(self, name: str) -> FieldNumber:
-        if name not in self._numbers:
-            self._numbers[name] = FieldNumber(self._run, NUMBERS[name])
-        return self._numbers[name]
-
-    def _slab_field(self, name: str) -> Field | None:
+    def _field(self, name: str) -> Field | None:
         if name not in self._fields:
-            self._fields[name] = field_of(self._run, Shot.of({"field": name}))
+            self._fields[name] = field_of(self._run, Shot.model_validate({"field": name}))
         return self._fields[name]
 
 
 def cloud(
-    grid: Grid, dye: VisibleDye, state: State, toward: Array
+    grid: Grid, dye: FieldDye, state: State, toward: Array
 ) -> tuple[Array, NDArray[np.float32], NDArray[np.float32], float]:
     """Centres (n, 3) m, colours (n, 3) and opacities (n,) of the cells with dye, and their size, m.
 

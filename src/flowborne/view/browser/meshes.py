@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyvista as pv
-from vtkmodules.vtkFiltersGeneral import vtkContourTriangulator
 
 from flowborne.kernels.arrays import Array, Integers
 
@@ -51,25 +50,17 @@ def prism_points(flat: Array, low: float, high: float) -> Array:
     return np.concatenate([top, top, bottom])
 
 
-def joined(meshes: Sequence[Mesh]) -> Mesh:
-    """Several meshes as one."""
-    if not meshes:
-        return nothing()
-    firsts = np.cumsum([0, *(len(vertices) for vertices, _ in meshes[:-1])])
-    faces = [first + faces for first, (_, faces) in zip(firsts, meshes, strict=True)]
-    return np.concatenate([vertices for vertices, _ in meshes]), np.concatenate(faces)
+def repeated(parts: Array, triangles: Integers, least: int = 0) -> Mesh:
+    """Equal meshes as one.
 
-
-def padded(mesh: Mesh, count: int, most: int) -> Mesh:
-    """A mesh of `count` equal parts as one of `most`; those that are added have no size."""
-    vertices, faces = mesh
-    if not 0 < count < most:
-        return mesh
-    each = len(vertices) // count
-    first = faces[: len(faces) // count]
-    added = [first + each * number for number in range(count, most)]
-    points = np.repeat(vertices[:1], each * (most - count), axis=0)
-    return np.concatenate([vertices, points]), np.concatenate([faces, *added])
+    parts      (n, k, 3) m, vertices of each, n > 0
+    triangles  (m, 3) vertices of one
+    least      number of meshes up to which others without size are added
+    """
+    added = max(least - len(parts), 0)
+    points = np.concatenate([parts, np.broadcast_to(parts[0, 0], (added, *parts.shape[1:]))])
+    first = parts.shape[1] * np.arange(len(points))
+    return points.reshape(-1, 3), (first[:, None, None] + triangles).reshape(-1, 3)
 
 
 def nothing() -> Mesh:
@@ -87,11 +78,7 @@ def counter_clockwise(outline: Array) -> Array:
 def _inside(points: Array, loops: Sequence[Integers]) -> Integers:
     """(m, 3) triangles of points (n, 3) of a plane, inside loops of these points."""
     lines = [entry for loop in loops for entry in (len(loop) + 1, *loop.tolist(), int(loop[0]))]
-    outline = pv.PolyData(points, lines=lines)
-    cap = vtkContourTriangulator()
-    cap.SetInputData(outline)
-    cap.Update()
-    faces = pv.wrap(cap.GetOutput()).regular_faces
+    faces = pv.PolyData(points, lines=lines).triangulate_contours().regular_faces
     return np.asarray(faces, np.int64)
 
 

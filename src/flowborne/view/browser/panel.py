@@ -14,14 +14,11 @@ from flowborne.view.browser.settings import Settings, Timeline
 from flowborne.view.browser.viewpoint import FilmView
 from flowborne.view.fields import Scale
 from flowborne.view.glyphs import Forces, round_number
-from flowborne.view.plots import robust_limits, strip_curves
+from flowborne.view.plots import robust_limits, signed, strip_curves
 from flowborne.view.run import Run
 
 if TYPE_CHECKING:
     from viser import GuiApi
-
-COLOUR_STOPS = 24
-"""Number of colours in the bar of a scale."""
 
 ARROW_LENGTH = 60.0
 """Length of the arrow of a large force in the legend, pixels."""
@@ -34,12 +31,6 @@ CHARACTER_WIDTH, AXIS_MARGIN = 6.6, 16
 
 MIN_AXIS_WIDTH = 58
 """Minimum width of the numbers at an axis, so that plots in a column are aligned, pixels."""
-
-PLOT_HEIGHT = 150
-"""Height of a plot, pixels."""
-
-PANEL_WIDTH = 360
-"""Width of the panel, pixels."""
 
 PACES = {"1/8": 0.125, "1/4": 0.25, "1/2": 0.5, "1": 1.0, "2": 2.0}
 """Name of a pace -> seconds of the run per second."""
@@ -78,10 +69,10 @@ def _named(name: str, colour: str) -> str:
 
 def _bar(scale: Scale) -> str:
     colours, low, high, name = scale
-    picked = colours[np.linspace(0, len(colours) - 1, COLOUR_STOPS).round().astype(int)]
+    picked = colours[np.linspace(0, len(colours) - 1, 24).round().astype(int)]
     stops = ",".join(f"rgb({r},{g},{b})" for r, g, b in np.rint(255.0 * picked).astype(int))
     bar = f"height:11px;border-radius:3px;background:linear-gradient(to right,{stops})"
-    ends = f"<span>{_number(low)}</span><span>{_number(high)}</span>"
+    ends = f"<span>{signed(low)}</span><span>{signed(high)}</span>"
     between = "display:flex;justify-content:space-between;font-variant-numeric:tabular-nums"
     return f'{escape(name)}<div style="{bar}"></div><div style="{between}">{ends}</div>'
 
@@ -99,10 +90,6 @@ def _force(forces: Forces) -> str:
     )
     what = f"force on a body: {force:g} {forces.unit}"
     return f'<span style="{line}"></span><span style="{head}"></span>{what}'
-
-
-def _number(value: float) -> str:
-    return f"{value:.2g}".replace("-", "−")
 
 
 class Curves:
@@ -137,7 +124,6 @@ class Curves:
             plot.data = self._data(values, 0.0)
 
     def _replace(self, titles: list[tuple[str, tuple[str, ...]]]) -> None:
-        """Replace the plots by others with these titles and names of curves."""
         for shown in self._shown:
             shown.remove()
         self._shown, self.plots, self._titles = [], [], titles
@@ -148,7 +134,7 @@ class Curves:
                 _series(len(names)),
                 padding=(8, 16, 0, 0),
                 legend={"show": False},
-                height=PLOT_HEIGHT,
+                height=150,
             )
             self._shown += [heading, plot]
             self.plots.append(plot)
@@ -165,7 +151,6 @@ class Curves:
 
 
 def _title(title: str, names: Sequence[str]) -> str:
-    """HTML of the title of a plot, and of the names of its curves in their colours."""
     named = [
         f'<span style="color:{_colour(n)};margin-left:10px">{escape(name)}</span>'
         for n, name in enumerate(names)
@@ -206,7 +191,6 @@ def room_for(low: float, high: float) -> int:
 
 
 def _axis(size: int, label: str | None = None) -> Any:
-    """uPlot's options of an axis; `size` is the width of its numbers, pixels."""
     font = "11px sans-serif"
     axis: dict[str, Any] = {"stroke": style.MUTED, "font": font, "labelFont": font, "size": size}
     axis |= {"grid": {"stroke": style.LINE, "width": 1}, "ticks": {"show": False}}
@@ -228,7 +212,7 @@ class Panel:
         gui.set_panel_label(run.name)
         gui.configure_theme(dark_mode=True, show_logo=False, show_share_button=False)
         gui.main_panel.dock_right()
-        gui.main_panel.set_width(PANEL_WIDTH)
+        gui.main_panel.set_width(360)
         self._add_time(gui)
         self.legend = gui.add_html("")
         self._add_shown(gui, run, view)

@@ -21,6 +21,7 @@ class Settings:
     bones       whether flesh is transparent to show its bones
     forces      whether the forces on the bodies are shown
     follow      whether the view follows the bodies
+    ghost       "none", "in place" or "beside": where the input motion is shown, if it is played
     """
 
     field: str = "none"
@@ -31,6 +32,7 @@ class Settings:
     bones: bool = False
     forces: bool = True
     follow: bool = True
+    ghost: str = "none"
 
 
 class Timeline:

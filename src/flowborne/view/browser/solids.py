@@ -13,16 +13,15 @@ from flowborne.view.browser.meshes import (
     Mesh,
     add_mesh,
     counter_clockwise,
-    joined,
     nothing,
-    padded,
     prism,
     prism_points,
+    repeated,
 )
-from flowborne.view.glyphs import SHAFT_WIDTH, Forces, arrow
+from flowborne.view.glyphs import SHAFT_WIDTH, Forces, flat_arrows
 from flowborne.view.outlines import Outlines, flesh_loops
 from flowborne.view.run import Run, Skin, State
-from flowborne.view.space.arrows import arrow_mesh
+from flowborne.view.space.arrows import TRIANGLES, arrows
 from flowborne.view.space.surfaces import Outside, colour_of, creased, force_arrows, mesh_of
 
 if TYPE_CHECKING:
@@ -31,7 +30,7 @@ if TYPE_CHECKING:
 SLAB_THICKNESS = 0.02
 """Thickness of drawn slabs, in smaller sides of the view."""
 
-FLAT_ARROW = prism([arrow(np.zeros(2), np.array([1.0, 0.0]), 0.1)[::-1]], 0.0, 1.0)[1]
+FLAT_ARROW = prism([flat_arrows(np.zeros(2), np.array([1.0, 0.0]), 0.1)[::-1]], 0.0, 1.0)[1]
 """Triangles of every flat arrow that is raised to a prism."""
 
 PIXELS = 700.0
@@ -122,7 +121,7 @@ class ForceArrows:
         self._arrows: MeshHandle | None = None
         self._outside = None
         if not run.is_slab:
-            self._outside = Outside(run.geoms, [mesh_of(geom) for geom in run.geoms], run.skins)
+            self._outside = Outside(run.geoms, run.skins)
 
     def show(self, state: State, visible: bool, along: Array) -> None:
         """Show the arrows of a state, or none.
@@ -148,14 +147,13 @@ class ForceArrows:
             found = self.scale.arrows(state, self._pixel)
             if not found:
                 return nothing()
-            flat = [arrow(tail, vector, width)[::-1] for _, tail, vector in found]
-            points = [prism_points(one, self._high, 1.5 * self._high) for one in flat]
-            mesh = joined([(vertices, FLAT_ARROW) for vertices in points])
-            return padded(mesh, len(flat), self.scale.most)
+            flat = [flat_arrows(tail, vector, width)[::-1] for _, tail, vector in found]
+            parts = [prism_points(one, self._high, 1.5 * self._high) for one in flat]
+            return repeated(np.array(parts), FLAT_ARROW, self.scale.most)
         tails, vectors = force_arrows(self.scale, self._outside, state, self._pixel)
         if not len(tails):
             return nothing()
-        return padded(arrow_mesh(tails, vectors, width), len(tails), self.scale.most)
+        return repeated(arrows(tails, vectors, width), TRIANGLES, self.scale.most)
 
 
 def _surfaces(run: Run, side: float) -> list[Mesh]:

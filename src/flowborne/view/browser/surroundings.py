@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from itertools import combinations, product
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from flowborne.fluid.grid import Array, Grid
 from flowborne.view import style
-from flowborne.view.browser.meshes import add_mesh
+from flowborne.view.browser.meshes import add_mesh, repeated
 from flowborne.view.browser.viewpoint import FilmView
-from flowborne.view.glyphs import camera_moves, crosses, motes, round_number
+from flowborne.view.glyphs import box_edges, camera_moves, crosses, motes, round_number
 from flowborne.view.run import Run
-from flowborne.view.space.arrows import arrow_mesh
+from flowborne.view.space.arrows import TRIANGLES, arrows
 from flowborne.view.space.lighting import LIGHTS
 from flowborne.view.space.surroundings import SQUARE, stands_on_ground
 
@@ -28,9 +27,6 @@ MARKED_AGAIN = 0.05
 
 LIGHT_RATIO = 3.0
 """Strength of a light in a browser over that in a film: browsers divide it by pi."""
-
-AMBIENT = 0.75
-"""Strength of the ambient light."""
 
 ABOVE = ((0.25, 0.45, -1.0), 0.75, "#ffffff")
 """Direction, strength and colour of the light on a slab, which is seen from above."""
@@ -81,7 +77,7 @@ class Surroundings:
 def _add_lights(scene: SceneApi, slab: bool, shadows: bool) -> None:
     scene.configure_default_lights(False)
     scene.configure_environment_map(None)
-    scene.add_light_ambient("/lights/ambient", intensity=AMBIENT)
+    scene.add_light_ambient("/lights/ambient", intensity=0.75)
     for n, (direction, strength, colour) in enumerate([ABOVE] if slab else LIGHTS):
         red, green, blue = style.to_bytes(style.rgb(colour)).tolist()
         x, y, z = (-10.0 * np.array(direction)).tolist()
@@ -139,12 +135,9 @@ def _add_marks(scene: SceneApi, low: Array, high: Array, view: FilmView, slab: b
 
 
 def _add_edges(scene: SceneApi, grid: Grid) -> LineSegmentsHandle:
-    """Add the edges of the fluid's domain."""
-    corners = np.array(list(product(*zip(grid.origin, grid.upper, strict=True))))
-    ends = [(a, b) for a, b in combinations(corners, 2) if np.count_nonzero(a != b) == 1]
     return scene.add_line_segments(
         "/run/domain",
-        np.array(ends, np.float32),
+        box_edges(np.array(grid.origin), np.array(grid.upper)).astype(np.float32),
         style.rgb(style.LINE),
         thickness=1.5,
         thickness_units="screen",
@@ -160,7 +153,7 @@ def show_wind(scene: SceneApi, wind: Array, view: FilmView) -> None:
         return
     vector = 0.17 * view.side * wind / speed
     tail = view.first.target - 0.54 * view.side * wind / speed
-    mesh = arrow_mesh(tail[None], vector[None], 0.012 * view.side)
+    mesh = repeated(arrows(tail[None], vector[None], 0.012 * view.side), TRIANGLES)
     colour = style.rgb(style.CURVES[1])
     add_mesh(scene, "/wind", mesh, color=colour, cast_shadow=False, receive_shadow=False)
     label_position = tail + 0.5 * vector + 0.04 * view.side * np.eye(3)["xyz".index(view.up[1])]

@@ -23,7 +23,7 @@ from flowborne.view.browser.settings import Settings, Timeline
 from flowborne.view.browser.solids import Bodies, ForceArrows, SkinMesh
 from flowborne.view.browser.surroundings import Surroundings
 from flowborne.view.browser.viewpoint import CameraKeys, FilmView
-from flowborne.view.paths import window_path
+from flowborne.view.framing import window_path
 from flowborne.view.run import Run, State
 
 if TYPE_CHECKING:
@@ -99,7 +99,7 @@ class RunView:
         self.timeline.advance(seconds)
         self.panel.apply_controls()
         timeline, settings = self.timeline, self.panel.settings
-        current = (timeline.number, timeline.playing, timeline.newest, settings, self._more())
+        current = (timeline.number, timeline.playing, timeline.newest, settings)
         if current != self._shown:
             self._show(settings)
             self._shown = current
@@ -119,6 +119,7 @@ class RunView:
         server.gui.reset()
         style_page(server, run.name)
         self.run, self._view = run, self._first_view(run)
+        self._path = list(self._view.path)
         self.timeline = Timeline(run.times)
         first, side = self._view.first, self._view.side
         server.initial_camera.position = tuple(first.position)
@@ -154,10 +155,9 @@ class RunView:
             self._fluid = Fluid(self.server.scene, run, toward, self.image_side)
 
     def _show(self, settings: Settings) -> None:
-        """Show the current state by the settings, in one message."""
         number = self.timeline.number
         state = self.run.state(number)
-        self._along = self._displacement(number) if settings.follow else np.zeros(3)
+        self._along = self._path[number] if settings.follow else np.zeros(3)
         names, scales = ((), ()) if self._fluid is None else self._fluid.legend(settings)
         with self.server.atomic():
             # moved like the bodies, and not added anew: a browser would do that some frames later
@@ -175,17 +175,9 @@ class RunView:
             self.panel.legend.content = legend_html(names, scales, shown)
         self.server.flush()
 
-    def _displacement(self, number: int) -> Array:
-        """(3,) m, of the film's camera in a state since the first one."""
-        return self._view.path[number]
-
     def _domain_moved(self, number: int, state: State) -> Array:
         """(3,) m, displacement of the fluid's domain in a state from its start."""
         return self._window[number]
-
-    def _more(self) -> object:
-        """What `_show_more` depends on, besides the state."""
-        return None
 
     def _show_more(self, number: int, settings: Settings) -> None:
         """Show what is not in every view; the curves up to the time in this one."""
@@ -214,8 +206,8 @@ class Viewer(RunView):
             self.timeline.show_newest()
 
     def _extend(self, run: GrowingRun) -> None:
-        """Update to the run with new frames."""
         self.run, self._view, self._window = run, FilmView.of(run), window_path(run)
+        self._path = list(self._view.path)
         self.timeline.extend(run.times)
         if len(run) >= 2 * self._measured:
             self._measure()

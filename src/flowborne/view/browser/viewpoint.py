@@ -9,7 +9,6 @@ import numpy as np
 
 from flowborne.kernels.arrays import Array
 from flowborne.view.framing import windows
-from flowborne.view.outlines import Outlines
 from flowborne.view.run import Run
 from flowborne.view.space.camera import camera_of
 
@@ -71,7 +70,7 @@ class FilmView:
         """raises  ValueError if its camera follows a body that does not exist"""
         lens = run.shot.camera.lens
         if run.is_slab:
-            views = windows(run, Outlines(run), run.shot, ASPECT)
+            views = windows(run, run.shot, ASPECT)
             path = np.column_stack([views[:, :2].mean(axis=1), views[:, 2:].mean(axis=1)])
             path = np.pad(path, ((0, 0), (0, 1)))
             sides = views[0, [1, 3]] - views[0, [0, 2]]

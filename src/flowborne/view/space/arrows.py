@@ -67,14 +67,6 @@ def arrows(tails: Array, vectors: Array, width: float) -> Array:
     return np.concatenate(rings, axis=1)
 
 
-def arrow_mesh(tails: Array, vectors: Array, width: float) -> tuple[Array, Integers]:
-    """Vertices (k, 3) m and triangles (m, 3), outward, of the same arrows."""
-    corners = arrows(tails, vectors, width)
-    triangles = np.concatenate([FACES[:, [0, 1, 2]], FACES[:, [0, 2, 3]]])
-    first = 5 * SIDES * np.arange(len(corners))
-    return corners.reshape(-1, 3), (first[:, None, None] + triangles).reshape(-1, 3)
-
-
 _TURN = 2.0 * np.pi * np.arange(SIDES) / SIDES
 _CIRCLE = np.stack([np.cos(_TURN), np.sin(_TURN)], axis=1)
 
@@ -89,6 +81,9 @@ def _faces() -> Integers:
 
 FACES = _faces()
 """(m, 4) corners of the faces of one arrow."""
+
+TRIANGLES = np.concatenate([FACES[:, [0, 1, 2]], FACES[:, [0, 2, 3]]])
+"""(2 m, 3) corners of the same faces in triangles, outward."""
 
 
 ROWS = 7
@@ -119,8 +114,17 @@ class WindArrows:
         self._vector = LENGTH * spacing * wind / speed
         self._width = WIDTH * spacing
         self._lowest = lowest + 0.5 * spacing
+        # the lattice covers the map behind the bodies for any phase of the pattern
+        farther = 1.0 + BEHIND * camera.height / camera.distance
+        half = 0.5 * farther * np.array([camera.width, camera.height])
+        count = np.ceil(half / spacing).astype(int) + 1
+        a, b = (x.ravel() for x in np.meshgrid(*(np.arange(-n - 2.0, n + 1.0) for n in count)))
         right, up, _ = camera.axes(0)
-        self._set_lattice(spacing, rows=abs(wind @ right) >= abs(wind @ up))
+        in_rows = abs(wind @ right) >= abs(wind @ up)
+        # odd rows, or columns, are shifted by half
+        lattice = [a + 0.5 * (b % 2), b] if in_rows else [a, b + 0.5 * (a % 2)]
+        self._lattice = spacing * np.stack(lattice, axis=1)
+        self._period = spacing * np.array([1.0, 2.0] if in_rows else [2.0, 1.0])
         self._arrows = Arrows(plotter, len(self._lattice), style.WIND, 0.3)
 
     def show(self, number: int, time: float) -> None:
@@ -133,17 +137,3 @@ class WindArrows:
         centres = focus + on_map @ plane - BEHIND * self._camera.height * toward
         tails = (centres - 0.5 * self._vector)[centres[:, 2] > self._lowest]
         self._arrows.show(tails, np.broadcast_to(self._vector, tails.shape), self._width)
-
-    def _set_lattice(self, spacing: float, rows: bool) -> None:
-        """Set points that cover the map behind the bodies for any phase of the pattern.
-
-        Odd rows (or columns) are shifted by half.
-        """
-        camera = self._camera
-        farther = 1.0 + BEHIND * camera.height / camera.distance
-        half = 0.5 * farther * np.array([camera.width, camera.height])
-        count = np.ceil(half / spacing).astype(int) + 1
-        a, b = (x.ravel() for x in np.meshgrid(*(np.arange(-n - 2.0, n + 1.0) for n in count)))
-        lattice = [a + 0.5 * (b % 2), b] if rows else [a, b + 0.5 * (a % 2)]
-        self._lattice = spacing * np.stack(lattice, axis=1)
-        self._period = spacing * np.array([1.0, 2.0] if rows else [2.0, 1.0])

@@ -12,10 +12,10 @@ from itertools import product
 import numpy as np
 
 from flowborne.kernels.arrays import Array
-from flowborne.view.framing import followed, radius_of
-from flowborne.view.paths import domain_shown
+from flowborne.scenes.schema_film import CameraTable
+from flowborne.view.framing import domain_shown, followed, radius_of
 from flowborne.view.run import Run
-from flowborne.view.shot import CameraShot, Shot
+from flowborne.view.shot import Shot
 
 FILLED, FILLED_BY_FLUID = 0.8, 0.9
 """Maximum part of the map that the bodies, or the domain of a fluid, fill."""
@@ -112,7 +112,7 @@ def _sources(run: Run, path: Array, far: float) -> Array:
 
 
 def _placed(
-    path: Array, seen: Array, shot: CameraShot, times: Array, filled: float, aspect: float | None
+    path: Array, seen: Array, shot: CameraTable, times: Array, filled: float, aspect: float | None
 ) -> Camera:
     """The camera of a shot; by default it is so far away that all points are in the view.
 

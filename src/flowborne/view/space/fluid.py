@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Protocol
-
 import numpy as np
 import pyvista as pv
 from numpy.typing import NDArray
@@ -15,12 +13,10 @@ from vtkmodules.vtkRenderingVolume import vtkGPUVolumeRayCastMapper
 
 from flowborne.fluid.grid import Array, Grid
 from flowborne.view import style
-from flowborne.view.fields import FieldNumber
+from flowborne.view.fields import FieldDye, FieldNumber, FieldVortices
 from flowborne.view.run import State
-from flowborne.view.space.camera import Camera
 from flowborne.view.space.lighting import scattered
 from flowborne.view.space.surfaces import LIT
-from flowborne.view.space.visible import Visible, VisibleDye, VisibleVortices
 from flowborne.view.style import Pixels
 
 SMOKE_DEPTH = 0.016
@@ -43,30 +39,10 @@ SLICE_PIXELS = 1024
 """Longer side of the image of a slice."""
 
 
-class DrawnFluid(Protocol):
-    """The fluid in a plotter."""
-
-    def show(self, state: State, grid: Grid, focus: Array, toward: Array) -> None:
-        """Show a state on a grid to a camera in the direction `toward` (3,).
-
-        focus  (3,) m, through which a slice goes
-        """
-        ...
-
-
-def fluid_in(plotter: pv.Plotter, grid: Grid, visible: Visible, camera: Camera) -> DrawnFluid:
-    """Add the visible quantity of a fluid to a plotter."""
-    if isinstance(visible, VisibleDye):
-        return Smoke(plotter, grid, visible, camera.height)
-    if isinstance(visible, VisibleVortices):
-        return Vortices(plotter, visible)
-    return Slice(plotter, grid, visible, camera.axes(0)[2])
-
-
 class Smoke:
     """A cloud of dye in a plotter."""
 
-    def __init__(self, plotter: pv.Plotter, grid: Grid, dye: VisibleDye, height: float) -> None:
+    def __init__(self, plotter: pv.Plotter, grid: Grid, dye: FieldDye, height: float) -> None:
         """`height`: of the view, m."""
         self._dye = dye
         self._depth = max(
@@ -140,45 +116,45 @@ def _property(depth: float) -> vtkVolumeProperty:
     return volume
 
 
-class VortexSurfaces:
-    """The surfaces of vortices in a state as a mesh.
+def vortex_surface(
+    vortices: FieldVortices,
+    state: State,
+    grid: Grid,
+    toward: Array,
+    max_fine: int = MAX_FINE_POINTS,
+) -> pv.PolyData:
+    """The surfaces of vortices as triangles; "sense" of their vertices is -1 (clockwise seen from
+    `toward` (3,)) to 1.
 
     max_fine  points up to which they are found on a grid twice as fine
     """
-
-    def __init__(self, vortices: VisibleVortices, max_fine: int = MAX_FINE_POINTS) -> None:
-        self._vortices, self._max_fine = vortices, max_fine
-
-    def of(self, state: State, grid: Grid, toward: Array) -> pv.PolyData:
-        """Triangles; "sense" of their vertices is -1 (clockwise seen from `toward` (3,)) to 1."""
-        finer = 2 if 8 * np.prod(grid.shape) <= self._max_fine else 1
-        h = grid.spacing / finer
-        image = pv.ImageData(
-            dimensions=[finer * n for n in grid.shape],
-            spacing=(h, h, h),
-            origin=[x + 0.5 * h for x in grid.origin],
-        )
-        for name, values, order in (
-            ("q", self._vortices.q(state), 3),
-            ("sense", self._vortices.sense(state, toward), 1),
-        ):
-            fine = values.astype(np.float32)
-            if finer > 1:
-                fine = zoom(fine, finer, order=order, grid_mode=True, mode="nearest")
-            image.point_data[name] = fine.ravel(order="F")
-        return image.contour([self._vortices.level], scalars="q")
+    finer = 2 if 8 * np.prod(grid.shape) <= max_fine else 1
+    h = grid.spacing / finer
+    image = pv.ImageData(
+        dimensions=[finer * n for n in grid.shape],
+        spacing=(h, h, h),
+        origin=[x + 0.5 * h for x in grid.origin],
+    )
+    for name, values, order in (
+        ("q", vortices.q(state), 3),
+        ("sense", vortices.sense(state, toward), 1),
+    ):
+        fine = values.astype(np.float32)
+        if finer > 1:
+            fine = zoom(fine, finer, order=order, grid_mode=True, mode="nearest")
+        image.point_data[name] = fine.ravel(order="F")
+    return image.contour([vortices.level], scalars="q")
 
 
 class Vortices:
     """Surfaces of vortices in a plotter."""
 
-    def __init__(self, plotter: pv.Plotter, vortices: VisibleVortices) -> None:
-        self._surfaces = VortexSurfaces(vortices)
-        self._plotter = plotter
+    def __init__(self, plotter: pv.Plotter, vortices: FieldVortices) -> None:
+        self._vortices, self._plotter = vortices, plotter
         self._actor: pv.Actor | None = None
 
     def show(self, state: State, grid: Grid, focus: Array, toward: Array) -> None:
-        surface = self._surfaces.of(state, grid, toward)
+        surface = vortex_surface(self._vortices, state, grid, toward)
         if self._actor is not None:
             self._plotter.remove_actor(self._actor, render=False)
             self._actor = None

@@ -22,16 +22,23 @@ REMEDY = (
 )
 
 
+def import_renderer() -> None:
+    """Import PyVista and VTK. Raises ValueError if they cannot be imported."""
+    try:
+        import pyvista  # noqa: F401
+    except ImportError as error:
+        raise ValueError(f"three dimensions cannot be drawn ({error}); {REMEDY}") from error
+
+
 def off_screen(width: int, height: int) -> Plotter:
     """Empty off-screen plotter of a size in pixels. Close it after use.
 
     raises  ValueError if this machine has no OpenGL
     """
-    try:
-        import pyvista
-        from vtkmodules.vtkCommonCore import vtkLogger
-    except ImportError as error:
-        raise ValueError(f"three dimensions cannot be drawn ({error}); {REMEDY}") from error
+    import_renderer()
+    import pyvista
+    from vtkmodules.vtkCommonCore import vtkLogger
+
     with _silent(vtkLogger):
         plotter = pyvista.Plotter(off_screen=True, window_size=(width, height), lighting="none")
     if plotter.render_window.GetClassName() == LAST_RESORT and not _loads(MESA):

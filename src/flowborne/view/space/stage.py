@@ -1,20 +1,27 @@
-"""The 3D scene of a run: lights, bodies, forces, ground, and wind or fluid."""
+"""The map of a picture of a run in space: lights, bodies, forces, ground, and wind or fluid."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pyvista as pv
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
 
 from flowborne.fluid.grid import Array, Grid
 from flowborne.view import style
-from flowborne.view.glyphs import SHAFT_WIDTH, Forces, camera_moves
-from flowborne.view.paths import through_window, window_path
-from flowborne.view.run import Geom, Run, State
+from flowborne.view.fields import FieldDye, FieldNumber, FieldVortices, Legend, Scale, field_of
+from flowborne.view.framing import through_window, window_path
+from flowborne.view.glyphs import SHAFT_WIDTH, Forces, box_edges, camera_moves
+from flowborne.view.maps import MapImage
+from flowborne.view.run import Run, State
 from flowborne.view.shot import Shot
 from flowborne.view.space.arrows import Arrows, WindArrows
-from flowborne.view.space.camera import Camera
-from flowborne.view.space.fluid import fluid_in
+from flowborne.view.space.camera import camera_of
+from flowborne.view.space.fluid import Slice, Smoke, Vortices
 from flowborne.view.space.lighting import KEY, LIGHTS
+from flowborne.view.space.opengl import off_screen
 from flowborne.view.space.surfaces import (
     LIT,
     Outside,
@@ -24,47 +31,51 @@ from flowborne.view.space.surfaces import (
     mesh_of,
 )
 from flowborne.view.space.surroundings import Ground, Motes, stands_on_ground, water_of
-from flowborne.view.space.visible import Visible
 from flowborne.view.style import Pixels
 
-MULTI_SAMPLES = 8
-"""Samples per pixel of anti-aliasing."""
 
+class MapSpace:
+    """Map of a run in space, drawn by VTK.
 
-class Stage:
-    """Scene of a run in a plotter, which it owns from then on.
-
-    visible  quantity of the fluid, if any
-    pixel    m, size of a pixel of the film
-    shot     background, and whether flesh is transparent to show its bones
+    camera  of all frames
+    width   m across the map, at the bodies
+    aspect  height over width
+    forces  the scale of the arrows of forces
     """
 
-    def __init__(
-        self,
-        plotter: pv.Plotter,
-        run: Run,
-        camera: Camera,
-        forces: Forces,
-        visible: Visible | None,
-        pixel: float,
-        shot: Shot,
-    ) -> None:
-        self._plotter, self._camera, self._forces, self._shot = plotter, camera, forces, shot
-        self._run = run
-        self._pixel = pixel
+    def __init__(self, run: Run, shot: Shot, aspect: float | None = None) -> None:
+        """`aspect`: required height over width of the map, if any."""
+        self._run, self._shot = run, shot
+        self.camera = camera_of(run, shot, aspect)
+        self.width, self.aspect = self.camera.width, self.camera.aspect
+        self.forces = Forces(run, min(self.camera.width, self.camera.height))
+        self._field = field_of(run, shot)
+        self.legend: Legend = () if self._field is None else self._field.legend
+        self.scale: Scale | None = None if self._field is None else self._field.scale
+        self._plotter: pv.Plotter | None = None
+
+    def draw_on(self, axes: Axes, pixels: int) -> Sequence[Artist]:
+        """Set the stage; returns the artist of its image in `axes`, `pixels` wide at scale 1.
+
+        raises  ValueError if three dimensions cannot be drawn on this machine
+        """
+        run, shot, camera, field = self._run, self._shot, self.camera, self._field
+        self._image = MapImage(axes)
+        self._plotter = plotter = off_screen(*self._image.pixels)
+        self._pixel = self.width / pixels
         _light(plotter)
         meshes = [mesh_of(geom) for geom in run.geoms]
         self._points = [np.asarray(mesh.points, float) for mesh in meshes]
-        self._bodies = [
-            _add_body(plotter, mesh, geom, run.accented)
-            for mesh, geom in zip(meshes, run.geoms, strict=True)
-        ]
+        self._bodies = []
+        for mesh, geom in zip(meshes, run.geoms, strict=True):
+            colour, opacity = colour_of(geom, run.accented)
+            self._bodies.append(plotter.add_mesh(mesh, color=tuple(colour), opacity=opacity, **LIT))
         self._hidden = [geom.covered and not shot.bones for geom in run.geoms]
         first = run.state(0)
         self._skins = [
             SkinSurface(plotter, skin, first, seen_through=shot.bones) for skin in run.skins
         ]
-        self._outside = Outside(run.geoms, meshes, run.skins)
+        self._outside = Outside(run.geoms, run.skins)
         self._arrows = Arrows(plotter, max(len(run.bodies), 1), style.FORCE, 0.35)
         self._ground = self._wind = self._motes = None
         if stands_on_ground(run):
@@ -77,14 +88,20 @@ class Stage:
             self._edges, self._path = _edges(plotter, run.grid), window_path(run)
         elif run.wind.any():
             self._wind = WindArrows(plotter, run, camera, 0.0 if self._ground else -np.inf)
-        self._fluid = None
-        if run.grid is not None and visible is not None:
-            self._fluid = fluid_in(plotter, run.grid, visible, camera)
+        self._fluid: Smoke | Vortices | Slice | None = None
+        if run.grid is not None and field is not None:
             self._through = through_window(run, camera.focus)
+            if isinstance(field, FieldDye):
+                self._fluid = Smoke(plotter, run.grid, field, camera.height)
+            elif isinstance(field, FieldNumber):
+                self._fluid = Slice(plotter, run.grid, field, camera.axes(0)[2])
+            elif isinstance(field, FieldVortices):
+                self._fluid = Vortices(plotter, field)
+        return [self._image]
 
-    def image(self, number: int, state: State) -> Pixels:
-        """(height, width, 3 or 4) picture of the `number`-th state, lowest row first."""
-        focus, toward = self._camera.focus[number], self._camera.axes(number)[2]
+    def show(self, number: int, state: State) -> None:
+        """Update the image to the `number`-th state."""
+        focus, toward = self.camera.focus[number], self.camera.axes(number)[2]
         positions = state["geom_position"].astype(float)
         rotations = state["geom_rotation"].astype(float)
         poses = zip(self._bodies, self._hidden, positions, rotations, strict=True)
@@ -104,25 +121,26 @@ class Stage:
         for facing, edge in self._edges:
             edge.position = self._path[number]
             edge.visibility = bool((facing @ toward < 0.0).any())
-        shown = force_arrows(self._forces, self._outside, state, self._pixel)
+        shown = force_arrows(self.forces, self._outside, state, self._pixel)
         self._arrows.show(*shown, SHAFT_WIDTH * self._pixel)
-        self._look(number)
-        return self._cut_out() if self._shot.transparent else self._render(self._shot.colour)
+        assert self._plotter is not None
+        view = self._plotter.camera
+        view.focal_point = focus
+        view.position = focus + self.camera.away[number]
+        view.up = self.camera.axes(number)[1]
+        view.view_angle = np.degrees(self.camera.lens)
+        self._plotter.renderer.ResetCameraClippingRange()
+        clear = self._shot.transparent
+        self._image.image = self._cut_out() if clear else self._render(self._shot.colour)
 
     def close(self) -> None:
-        self._plotter.close()
-
-    def _look(self, number: int) -> None:
-        """Set the camera of a frame."""
-        view, focus = self._plotter.camera, self._camera.focus[number]
-        view.focal_point = focus
-        view.position = focus + self._camera.away[number]
-        view.up = self._camera.axes(number)[1]
-        view.view_angle = np.degrees(self._camera.lens)
-        self._plotter.renderer.ResetCameraClippingRange()
+        """Close VTK's window; nothing can be drawn afterwards."""
+        if self._plotter is not None:
+            self._plotter.close()
 
     def _render(self, background: str) -> Pixels:
         """(height, width, 3) image with a background, lowest row first."""
+        assert self._plotter is not None
         self._plotter.set_background(background)
         # a screenshot renders only the first time
         self._plotter.render()
@@ -145,18 +163,11 @@ class Stage:
 
 
 def _light(plotter: pv.Plotter) -> None:
-    plotter.enable_anti_aliasing("msaa", multi_samples=MULTI_SAMPLES)
+    plotter.enable_anti_aliasing("msaa", multi_samples=8)
     for direction, strength, colour in LIGHTS:
         light = pv.Light(color=colour, intensity=strength, light_type="scene light")
         light.position, light.focal_point = -np.array(direction), (0.0, 0.0, 0.0)
         plotter.add_light(light)
-
-
-def _add_body(
-    plotter: pv.Plotter, mesh: pv.PolyData, geom: Geom, accented: frozenset[int]
-) -> pv.Actor:
-    colour, opacity = colour_of(geom, accented)
-    return plotter.add_mesh(mesh, color=tuple(colour), opacity=opacity, **LIT)
 
 
 def _place(actor: pv.Actor, position: Array, rotation: Array, *, hidden: bool) -> None:
@@ -175,14 +186,9 @@ def _edges(plotter: pv.Plotter, grid: Grid) -> list[tuple[Array, pv.Actor]]:
     """
     low, high = np.array(grid.origin), np.array(grid.upper)
     edges = []
-    for axis in range(3):
-        for sides in np.ndindex(2, 2):
-            others = np.delete(np.arange(3), axis)
-            ends = np.stack([low, high])
-            ends[:, others] = np.where(sides, high[others], low[others])
-            facing = np.zeros((2, 3))
-            facing[[0, 1], others] = np.where(sides, 1.0, -1.0)
-            line = pv.line_segments_from_points(ends)
-            actor = plotter.add_mesh(line, color=style.LINE, line_width=1.2, lighting=False)
-            edges.append((facing, actor))
+    for ends in box_edges(low, high):
+        facing = np.diag(np.sign(ends.mean(axis=0) - 0.5 * (low + high)))
+        line = pv.line_segments_from_points(ends)
+        actor = plotter.add_mesh(line, color=style.LINE, line_width=1.2, lighting=False)
+        edges.append((facing[facing.any(axis=1)], actor))
     return edges

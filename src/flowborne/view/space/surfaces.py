@@ -150,16 +150,11 @@ def exit_distance(start: Array, along: Array, corners: Array) -> float:
 
 
 class Outside:
-    """The bodies as convex parts bounded by planes, and the skins around them.
+    """The bodies as convex parts bounded by planes, and the skins around them."""
 
-    meshes  of the geometries, in their own frames
-    """
-
-    def __init__(
-        self, geoms: Sequence[Geom], meshes: Sequence[pv.PolyData], skins: Sequence[Skin] = ()
-    ) -> None:
+    def __init__(self, geoms: Sequence[Geom], skins: Sequence[Skin] = ()) -> None:
         self._skins = skins
-        self._planes = [_planes(mesh) for mesh in meshes]
+        self._planes = [_planes(mesh_of(geom)) for geom in geoms]
         self._parts: dict[int, list[int]] = {}
         for n, geom in enumerate(geoms):
             self._parts.setdefault(geom.body, []).append(n)

@@ -29,9 +29,6 @@ SQUARE = 0.6
 SHADOW_PIXELS = 192
 """Side of the image of the shadow."""
 
-SHADOW_BLUR = 1.6
-"""Softness of the shadow's edge, pixels of its image."""
-
 SHADOW_OPACITY = 0.62
 """Share of the light that the shadow removes."""
 
@@ -40,9 +37,6 @@ MOTES = 1200
 
 MOTES_REACH = 1.1
 """Distance from the focus at which motes are faded out, in heights of the map."""
-
-MOTE_SIZE = 3.0
-"""Size of a mote, pixels."""
 
 
 def stands_on_ground(run: Run) -> bool:
@@ -110,7 +104,7 @@ class Ground:
         for outline in [*outlines, *self._projected(known, corner)]:
             if len(outline) > 2:
                 draw.polygon([tuple(point) for point in outline.tolist()], fill=255)
-        return np.asarray(image.filter(ImageFilter.GaussianBlur(SHADOW_BLUR)))
+        return np.asarray(image.filter(ImageFilter.GaussianBlur(1.6)))
 
     def _projected(self, points: Array, corner: Array) -> Array:
         """(..., 2) position of the shadows of points (..., 3) on the image, pixels."""
@@ -181,7 +175,7 @@ class Motes:
         self._mesh.point_data["colour"] = np.tile(
             style.to_bytes(np.append(style.rgb(style.MOTES), 1.0)), (MOTES, 1)
         )
-        _add(plotter, self._mesh, style="points", point_size=MOTE_SIZE)
+        _add(plotter, self._mesh, style="points", point_size=3.0)
 
     def show(self, focus: Array, toward: Array) -> None:
         """Show the motes around `focus` (3,).

@@ -10,10 +10,8 @@ import pytest
 
 from flowborne.view import style
 from flowborne.view.fields import FADED
-from flowborne.view.framing import windows
+from flowborne.view.framing import domain_shown, through_window, window_path, windows
 from flowborne.view.maps import MapSlab
-from flowborne.view.outlines import Outlines
-from flowborne.view.paths import domain_shown, through_window, window_path
 from flowborne.view.pictures import Picture
 from flowborne.view.run import Run
 from flowborne.view.shot import Shot
@@ -32,11 +30,11 @@ def run(write_run: Write) -> Run:
 
 def shot(**keys: object) -> Shot:
     camera = {"follow": keys.pop("follow", "bodies")}
-    return Shot.of({"plots": False, "scale_bar": False, "camera": camera, **keys})
+    return Shot.model_validate({"plots": False, "scale_bar": False, "camera": camera, **keys})
 
 
 def views_of(run: Run, shown: Shot) -> np.ndarray:
-    return windows(run, Outlines(run), shown, None)
+    return windows(run, shown)
 
 
 def test_the_path_of_a_domain_has_no_steps(run: Run) -> None:

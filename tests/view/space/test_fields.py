@@ -9,9 +9,8 @@ import pytest
 
 from flowborne.fluid.grid import Grid
 from flowborne.view import style
-from flowborne.view.fields import FieldNumber
+from flowborne.view.fields import FieldDye, FieldNumber, FieldVortices, field_of
 from flowborne.view.shot import Shot
-from flowborne.view.space.visible import VisibleDye, VisibleVortices, visible_of
 
 State = dict[str, np.ndarray]
 
@@ -40,8 +39,8 @@ def shown(grid: Grid, *states: State) -> SimpleNamespace:
 def test_q_is_of_rotation_less_strain(box_of_fluid: Grid, rate: float, strain: float) -> None:
     """Half of |rotation rate|^2 = 2 rate^2, less half of |strain rate|^2 = 2 strain^2."""
     state = turning(box_of_fluid, np.array([0.0, 0.0, rate]), strain)
-    seen = visible_of(shown(box_of_fluid, state), Shot())
-    assert isinstance(seen, VisibleVortices)
+    seen = field_of(shown(box_of_fluid, state), Shot())
+    assert isinstance(seen, FieldVortices)
     np.testing.assert_allclose(seen.q(state), rate**2 - strain**2, atol=1e-4)
     closed = seen.q(state | {"open": np.zeros_like(state["open"])})
     assert not closed.any()
@@ -50,14 +49,14 @@ def test_q_is_of_rotation_less_strain(box_of_fluid: Grid, rate: float, strain: f
 @pytest.mark.parametrize("sense", [1.0, -1.0])
 def test_the_sense_is_that_which_the_camera_sees(box_of_fluid: Grid, sense: float) -> None:
     state = turning(box_of_fluid, 3.0 * sense * TOWARD)
-    seen = VisibleVortices(shown(box_of_fluid, state))  # type: ignore[arg-type]
+    seen = FieldVortices(shown(box_of_fluid, state))  # type: ignore[arg-type]
     np.testing.assert_allclose(seen.sense(state, TOWARD), sense, atol=1e-5)
 
 
 def test_the_legend_says_what_the_surfaces_are(box_of_fluid: Grid) -> None:
     """Slabs that turn at different rates: the strongest hold more than VORTEX_SHARE of all Q."""
     state = turning(box_of_fluid, np.array([0.0, 0.0, 1.0]))
-    seen = VisibleVortices(shown(box_of_fluid, state))  # type: ignore[arg-type]
+    seen = FieldVortices(shown(box_of_fluid, state))  # type: ignore[arg-type]
     assert seen.level == pytest.approx(1.0, rel=0.01)
     assert [colour for _, colour in seen.legend] == [style.SPIN_LEFT[1], style.SPIN_RIGHT[1]]
     assert seen.legend[0][0] == "vortices, Q = 1 /s², counter-clockwise"
@@ -68,8 +67,8 @@ def test_dye_has_its_colour_and_is_as_dense_as_there_is_of_it(box_of_fluid: Grid
     ink[:6], milk[:, :5] = 2.0, 0.5
     ink[0, 0, 0], milk[0, 0, 0] = np.nan, np.nan
     state = {"open": np.ones_like(ink), "scalar_ink": ink, "scalar_milk": milk}
-    seen = visible_of(shown(box_of_fluid, state), Shot("dye"))
-    assert isinstance(seen, VisibleDye)
+    seen = field_of(shown(box_of_fluid, state), Shot(field="dye"))
+    assert isinstance(seen, FieldDye)
     assert seen.legend == [("ink", style.DYES[0]), ("milk", style.DYES[1])]
     colour, density = seen.smoke(state)
     first, second = (style.rgb(name) for name in style.DYES[:2])
@@ -85,7 +84,7 @@ def test_dye_has_its_colour_and_is_as_dense_as_there_is_of_it(box_of_fluid: Grid
 
 def test_a_slice_shows_the_layer_where_it_is(box_of_fluid: Grid) -> None:
     state = turning(box_of_fluid, np.array([0.0, 0.0, 2.0]))
-    seen = visible_of(shown(box_of_fluid, state), Shot("speed"))
+    seen = field_of(shown(box_of_fluid, state), Shot(field="speed"))
     assert isinstance(seen, FieldNumber)
     assert seen.scale is not None
     assert seen.scale[3] == "speed (m/s)"
@@ -98,6 +97,6 @@ def test_a_slice_shows_the_layer_where_it_is(box_of_fluid: Grid) -> None:
 
 def test_nothing_is_seen_where_nothing_is_wanted_and_no_dye_is_said(box_of_fluid: Grid) -> None:
     state = turning(box_of_fluid, TOWARD)
-    assert visible_of(shown(box_of_fluid, state), Shot("none")) is None
+    assert field_of(shown(box_of_fluid, state), Shot(field="none")) is None
     with pytest.raises(ValueError, match="the run has no dye to show"):
-        visible_of(shown(box_of_fluid, state), Shot("dye"))
+        field_of(shown(box_of_fluid, state), Shot(field="dye"))
