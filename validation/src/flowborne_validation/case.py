@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from fnmatch import fnmatchcase
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -198,7 +198,7 @@ class Case:
         return [self._result(name, figure_of(f), quick, seconds) for name, f in found.items()]
 
     def _result(self, quantity: str, figure: Figure, quick: bool, seconds: float) -> Result:
-        rule = next(rule for name, rule in self.rules.items() if _fits(name, quantity))
+        rule = next(rule for name, rule in self.rules.items() if fnmatchcase(quantity, name))
         rule, listed = replace(rule, **figure.judged), entry(self.id)
         exact = rule.reference_of(quantity, figure, listed.quantities)
         value, series = rule.value_of(figure, exact)
@@ -216,11 +216,6 @@ class Case:
         tier, judged = self.quick if quick else self.full, (value, exact, rule.accepted, verdict)
         found = (*judged, lines, seconds, not quick, series, figure.plot)
         return Result(self.id, tier, quantity, *found)
-
-
-def _fits(name: str, quantity: str) -> bool:
-    """Whether a name with * for any text is that of a quantity."""
-    return re.fullmatch(".*".join(map(re.escape, name.split("*"))), quantity) is not None
 
 
 def _cause(error: Exception) -> str:

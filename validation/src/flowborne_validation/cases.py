@@ -15,7 +15,7 @@ from flowborne_validation.findings import Figures, figure_of, over
 
 
 @cache
-def table() -> dict[str, Case]:
+def cases() -> dict[str, Case]:
     """Every case by its id, from cases.toml."""
     text = files("flowborne_validation").joinpath("cases.toml").read_text(encoding="utf-8")
     rows: dict[str, Any] = tomllib.loads(text)
@@ -64,4 +64,4 @@ def case_ids() -> Sequence[str]:
 
 def case(name: str) -> Case:
     """The case with this id. Raises KeyError when there is none."""
-    return table()[name]
+    return cases()[name]

@@ -151,23 +151,19 @@ def pulse(cells: int, place: Place, duration: float = DURATION) -> Array:
 def swelling_inflow(grids: Sequence[int]) -> Figures:
     """B3: largest drag and lift in the pulse, and the pressure drop at its end."""
     runs = [[pulse(n, place) for place in PLACES[: 1 if n in ONCE else None]] for n in grids]
-    last = runs[-1][0]
+    drags, lifts = ([[crest(run[:, c])[0] for run in some] for some in runs] for c in (1, 2))
+    drops = [[float(run[-1, 3]) for run in some] for some in runs]
+    rows = (  # s at which the published ones are reached
+        ("cD max", drags, "drag coefficient", 3.93625),
+        ("cL max", lifts, "lift coefficient", 5.693125),
+        ("dp(t=8)", drops, "pressure drop (Pa)", DURATION),
+    )
+    last, found = runs[-1][0], {}
     thinned = last[:: max(1, len(last) // 400)]
-    found = {}
-    # s at which the published drag and lift are largest
-    for column, (quantity, name, time) in enumerate(
-        (
-            ("cD max", "drag coefficient", 3.93625),
-            ("cL max", "lift coefficient", 5.693125),
-            ("dp(t=8)", "pressure drop (Pa)", DURATION),
-        ),
-        1,
-    ):
-        largest = (lambda run: crest(run)[0]) if column < 3 else (lambda run: float(run[-1]))
+    for column, (quantity, values, name, time) in enumerate(rows, 1):
         curves = (
             Curve("published", (time,), (reference("B3", quantity),), True),
             Curve("flowborne", thinned[:, 0], thinned[:, column]),
         )
-        values = [[largest(run[:, column]) for run in some] for some in runs]
         found[quantity] = Figure(values, grids, plot=Plot("t (s)", name, curves))
     return found

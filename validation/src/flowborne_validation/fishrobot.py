@@ -22,9 +22,6 @@ from flowborne_validation.findings import Figure, Figures
 from flowborne_validation.measurements import rows_of
 from flowborne_validation.worlds import frames_of
 
-RUNS = ("0.50", "1.00", "1.50", "2.00")
-"""Names of the runs: Hz of the motor as it was set."""
-
 FRAMES, SKIPPED, COUNTED = 40, 6, 3
 """Frames per beat, beats from the start that are left out, and those that are measured after."""
 
@@ -191,7 +188,9 @@ def compared(runs: Sequence[str], grids: Sequence[int], bar: bool = False) -> Fi
             + ", ".join(f"{speed:.4f}" for speed in one.by_beat())
             for n, one in zip(grids, swims, strict=True)
         ]
-        lines += [per_beat(figures[-1, 0], real), *changes]
+        # the way does not depend on the time base of the video
+        ways = (speed / real["beat_hz"] for speed in (figures[-1, 0], real["speed"]))
+        lines += ["way in a beat {:.4f} m, measured {:.4f} m".format(*ways), *changes]
         errors.append(np.abs(figures[:, 0] - real["speed"]))
         for k, (quantity, (value, error)) in enumerate(zip(QUANTITIES, COLUMNS, strict=True)):
             found[f"run {run}, beat {real['beat_hz']:.3f} Hz: {quantity}"] = Figure(
@@ -205,12 +204,6 @@ def compared(runs: Sequence[str], grids: Sequence[int], bar: bool = False) -> Fi
     others = f"the authors' fitted twin {twin:g} and elongated-body theory {slender:g}, over 8 runs"
     mean = Figure(np.mean(errors, axis=0), grids, twin, lines=[others])
     return {**found, f"mean error of speed over {len(runs)} runs, m/s": mean}
-
-
-def per_beat(speed: float, real: Mapping[str, float]) -> str:
-    """The way in a beat, which does not depend on the time base of the video, in words."""
-    ways = (v / real["beat_hz"] for v in (speed, real["speed"]))
-    return "way in a beat {:.4f} m, measured {:.4f} m".format(*ways)
 
 
 def error_bar(cells: Sequence[int]) -> list[str]:

@@ -74,30 +74,23 @@ ENERGY, DISSIPATION = 0.125, 2.0 / REYNOLDS * 0.375
 """E in m^2/s^2 and -dE/dt in m^2/s^3 at the start."""
 
 
-def solid_vortices(x: Array, y: Array, z: Array) -> tuple[Array, Array, Array]:
-    """Taylor-Green vortices in three dimensions, at the start of F3."""
-    u, v = np.sin(x) * np.cos(y) * np.cos(z), -np.cos(x) * np.sin(y) * np.cos(z)
-    return components(x, y, z, u, v)
-
-
-def vortices(cells: int) -> World:
-    """F3's periodic box at the start."""
-    grid = Grid((cells, cells, cells), SIDE / cells, (0.0, 0.0, 0.0))
-    world = make_world(
-        grid=grid, viscosity=1.0 / REYNOLDS, boundaries=Boundaries(*(PERIODIC,) * 6), tolerance=1e-7
-    )
-    set_velocity(world, solid_vortices)
-    return world
-
-
 def decay(cells: int, duration: float) -> tuple[Array, Array, Array]:
-    """Decay of F3's vortices over `duration` s.
+    """Decay over `duration` s of F3's vortices in a periodic box.
 
     returns  (n+1,) energy per mass at the ends of all steps, m^2/s^2; (n-1,) times, s, and rates
              -dE/dt, m^2/s^3, in the middle of all steps but the first, which has no earlier
              acceleration
     """
-    world = vortices(cells)
+
+    def vortices(x: Array, y: Array, z: Array) -> tuple[Array, Array, Array]:
+        u, v = np.sin(x) * np.cos(y) * np.cos(z), -np.cos(x) * np.sin(y) * np.cos(z)
+        return components(x, y, z, u, v)
+
+    grid = Grid((cells, cells, cells), SIDE / cells, (0.0, 0.0, 0.0))
+    world = make_world(
+        grid=grid, viscosity=1.0 / REYNOLDS, boundaries=Boundaries(*(PERIODIC,) * 6), tolerance=1e-7
+    )
+    set_velocity(world, vortices)
     # in a step the fastest fluid crosses half a cell
     count, dt = whole_steps(duration, 0.5 * SIDE / cells)
     energies = history(world, dt, count, lambda: kinetic_energy(world) / SIDE**3)
@@ -196,9 +189,9 @@ def kovasznay_flow(x: Array, y: Array, z: Array, time: float = 0.0) -> tuple[Arr
     return components(x, y, z, u, v)
 
 
-def kovasznay_error(cells: int, duration: float) -> float:
-    """Root of the mean square error of the velocity, in m/s, after `duration` s from the exact
-    flow, with `cells` per m."""
+def kovasznay(cells: int, duration: float) -> Figures:
+    """F7: root of the mean square error of the velocity, in m/s, after `duration` s from the exact
+    flow, with `cells` per m and the exact velocity on all sides."""
     grid = Grid.slab(3 * cells // 2, 2 * cells, 1.0 / cells, (-0.5, -0.5))
     sides = all_inflow(kovasznay_flow)
     world = make_world(grid=grid, viscosity=1.0 / RE, boundaries=sides, tolerance=1e-10)
@@ -211,9 +204,4 @@ def kovasznay_error(cells: int, duration: float) -> float:
         x, y, z = np.meshgrid(*grid.face_coordinates(axis), indexing="ij")
         squares += float(((state.velocity[axis] - kovasznay_flow(x, y, z)[axis]) ** 2).sum())
         number += x.size
-    return float(np.sqrt(squares / number))
-
-
-def kovasznay(cells: int, duration: float) -> Figures:
-    """F7: order of the velocity's error, with the exact velocity on all sides."""
-    return {"order of the velocity's L2 error": kovasznay_error(cells, duration)}
+    return {"order of the velocity's L2 error": float(np.sqrt(squares / number))}

@@ -181,9 +181,10 @@ def annulus(cells: int, free: bool) -> World:
     return make_world(mjcf(ring, shaft), grid, viscosity=VISCOSITY, motions=motions)
 
 
-def measured(cells: int) -> tuple[float, float]:
-    """Torque on the inner cylinder in the steady flow, and the rate of its spin-down from there,
-    both over the exact ones."""
+def between_cylinders(cells: int) -> Figures:
+    """V8: torque on the inner cylinder in the steady flow, and the rate of its spin-down then,
+    both over the exact ones. The list's unbounded cylinder is the limit of the same formula for
+    large b."""
     dt = OUTER / cells / (SPIN * INNER)
     driven = annulus(cells, free=False)
     # in 1 s, 40 times (b - a)^2 / (pi^2 nu), the flow becomes steady
@@ -195,11 +196,7 @@ def measured(cells: int) -> tuple[float, float]:
     steps = int(0.2 / RATE / dt)
     advance(freed, dt, steps)
     rate = np.log(SPIN / freed.solid.v[0]) / (steps * dt)
-    return float(-torque / (SPIN * TORQUE)), float(rate / RATE)
-
-
-def between_cylinders(cells: int) -> Figures:
-    """V8: torque of the steady flow, and the spin-down of the free inner cylinder. The list's
-    unbounded cylinder is the limit of the same formula for large b."""
-    torque, rate = measured(cells)
-    return {"torque / exact, steady": torque, "rate of the spin-down / exact": rate}
+    return {
+        "torque / exact, steady": float(-torque / (SPIN * TORQUE)),
+        "rate of the spin-down / exact": float(rate / RATE),
+    }

@@ -139,11 +139,6 @@ def steady_drag(
     return after, f"Cd changes by {after - before:.2g} in the last D/U"
 
 
-def of_sphere(report: StepReport) -> float:
-    """Cd = F / (rho U^2 / 2  pi D^2 / 4); the quarter has a quarter of F."""
-    return float(4.0 * force_on(report)[0] * 8.0 / np.pi)
-
-
 def recirculation(world: World) -> float:
     """Length of the backflow behind the sphere along its axis, m; 0 where there is none."""
     fluid, state = world.flow()
@@ -181,13 +176,16 @@ def separation(world: World, aside: Vector) -> float:
 
 def sphere(grids: Sequence[int], once: Sequence[int]) -> Figures:
     """B7: drag at Re 100 and 150, and the bubble behind the sphere at Re 100."""
+
+    def measure(world: World, first: bool) -> tuple[Sequence[float], str]:
+        # Cd = F / (rho U^2 / 2  pi D^2 / 4); the quarter has a quarter of F
+        drag, text = steady_drag(
+            world, 16.0 if first else 6.0, lambda report: 32.0 * force_on(report)[0] / np.pi
+        )
+        return (drag, recirculation(world), separation(world, BETWEEN)), text
+
     found: dict[str, Figure] = {}
     for reynolds in (100, 150):
-
-        def measure(world: World, first: bool) -> tuple[Sequence[float], str]:
-            drag, text = steady_drag(world, 16.0 if first else 6.0, of_sphere)
-            return (drag, recirculation(world), separation(world, BETWEEN)), text
-
         build = partial(quarter, reynolds=reynolds)
         (drags, lengths, angles), lines = over_places(grids, build, STREAM, measure, once)
         exact = float(reference("B7", f"Cd({reynolds})"))
