@@ -99,13 +99,9 @@ def flyer_gain(name: str, controlled: Flight, without: Flight) -> Figures:
         for n, (c, b) in enumerate(zip(ours, others, strict=True))
     ]
     down, up = np.abs(ours).mean(axis=0)
-    return {
-        f"{name}: upward impulse of a stroke with control less that without, N s": Figure(
-            gain, lines=lines
-        ),
-        f"{name}: drag impulse of the downstroke over that of the upstroke, with control": down
-        / up,
-    }
+    title = f"{name}: upward impulse of a stroke with control less that without, N s"
+    halves = f"{name}: drag impulse of the downstroke over that of the upstroke, with control"
+    return {title: Figure(gain, lines=lines), halves: float(down / up)}
 
 
 def twist_is_worth_it(strokes: int, settings: Mapping[str, str]) -> Figures:

@@ -29,7 +29,7 @@ from flowborne_validation.worlds import (
 )
 
 ONCE = (24, 32)
-"""Grids of them and of B4 with one place in the cell, of which each takes half an hour."""
+"""Cells across D of B4, B5, B6 and V9 with one place in the cell; each takes half an hour."""
 
 BACK: Vector = (0.5, 0.0, 0.0)
 LONGEST = 5.5
