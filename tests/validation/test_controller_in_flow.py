@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from flowborne_validation import cases
 from flowborne_validation import controller_in_flow as case
 
 
 def test_K6_law_of_the_frames() -> None:
-    for finding in case.frames_and_strength(True):
-        assert finding.passed, f"{finding.quantity}: {finding.value} {finding.lines}"
+    for result in cases.case("K6").run(quick=True):
+        assert result.verdict == "pass", f"{result.quantity}: {result.value} {result.lines}"
 
 
 def test_course_that_arrives_and_chatters() -> None:

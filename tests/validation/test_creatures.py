@@ -6,9 +6,14 @@ import numpy as np
 import pytest
 
 from flowborne import Simulation, load_scene
-from flowborne_validation.creatures import COARSE, CYCLE, Flight, Swim, fly
+from flowborne_validation.creatures import CYCLE, Flight, Swim, fly
 
-UPSTROKE = {**COARSE, "motion.0.phase": "-90.0", "motion.1.phase": "-90.0"}
+UPSTROKE = {
+    "domain.resolution": "16",
+    "time.frames_per_second": "20",
+    "motion.0.phase": "-90.0",
+    "motion.1.phase": "-90.0",
+}
 """Both wings start at the bottom."""
 
 

@@ -1,11 +1,14 @@
-"""Case I10, on coarse grids."""
+"""Case I10 on coarse grids, and I12 without the sphere in a stream, which takes minutes."""
 
 from __future__ import annotations
 
-from flowborne_validation import far_sides as case
+import pytest
+
+from flowborne_validation.cases import case
 
 
-def test_I10_is_met() -> None:
-    findings = case.between_far_sides(True)
-    assert len(findings) == 11
-    assert all(finding.passed for finding in findings)
+@pytest.mark.parametrize(("name", "count"), [("I10", 11), ("I12", 4)])
+def test_case_is_met(name: str, count: int) -> None:
+    results = case(name).run(quick=True)
+    assert len(results) == count
+    assert all(result.verdict == "pass" for result in results)

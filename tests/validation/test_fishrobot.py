@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from flowborne_validation.cases import case
 from flowborne_validation.fishrobot import (
     COUNTED,
     FRAMES,
     HEAD,
-    RUNS,
     SKIPPED,
     Swim,
     compared,
@@ -54,7 +54,7 @@ def test_R2_the_head_is_where_its_markers_are() -> None:
 
 
 def test_R2_gait_is_the_measured_series() -> None:
-    for run in RUNS:
+    for run in ("0.50", "1.00", "1.50", "2.00"):
         assert measured(run)["run_hz"] == float(run)
         formulas = gait(run, means=True)
         rows = [row for row in table("joint_series") if row["run_hz"] == run]
@@ -85,7 +85,7 @@ def test_R2_degrees_that_move_from_joint_to_joint_keep_the_fin() -> None:
 
 def test_R2_robot_swims_about_as_fast_as_the_real_one() -> None:
     """On cells of 2 cm, as the short run of the case."""
-    found = compared(("1.00",), (45,))
+    found = case("R2").judge(compared(("1.00",), (45,)))
     speed, _, _, mean = found
     assert mean.value == pytest.approx(abs(speed.value - speed.reference))
     assert abs(speed.value - speed.reference) < 0.5 * speed.reference

@@ -8,17 +8,19 @@ from scipy.sparse import csc_array
 
 from flowborne.solids.flesh_dynamics import static_forces
 from flowborne.solvers.cholesky import symmetric_factor
+from flowborne_validation import cases
 from flowborne_validation import flesh as case
+from flowborne_validation.findings import figure_of
 from flowborne_validation.flesh_bars import bar_of, tissue_table
 from flowborne_validation.worlds import NOWHERE
 
 
 def test_D1_comes_near_and_nearer() -> None:
     """CSM1 and CSM2, in a slab and in a room: within 2 % of cells that are as long as wide."""
-    for finding in case.flags(True):
-        assert finding.series is not None
-        assert finding.series.falls
-        assert finding.passed, f"{finding.quantity}: {finding.value}"
+    for result in cases.case("D1").run(quick=True):
+        assert result.series is not None
+        assert result.series.falls
+        assert result.verdict == "pass", f"{result.quantity}: {result.value}"
 
 
 @pytest.mark.parametrize("poisson", [0.0, 0.3, 0.4, 0.45, 0.49])
@@ -39,22 +41,17 @@ def test_a_skin_one_element_thick_bends_as_a_plate(cells: tuple[int, ...], poiss
     assert -1e6 * bar.end(q)[1] == pytest.approx(expected, rel=0.05)
 
 
-def test_D4_large_deflections() -> None:
-    for finding in case.elastica(True):
-        assert finding.passed, f"{finding.quantity}: {finding.value}"
-
-
-def test_D5_vibrations() -> None:
-    for finding in case.vibration(True):
-        assert finding.passed, f"{finding.quantity}: {finding.value}"
+@pytest.mark.parametrize("name", ["D4", "D5"])
+def test_large_deflections_and_vibrations(name: str) -> None:
+    for result in cases.case(name).run(quick=True):
+        assert result.verdict == "pass", f"{result.quantity}: {result.value}"
 
 
 def test_D5_frequency_in_time_is_that_of_its_step() -> None:
     """sin(omega' dt / 2) = omega dt / 2 / sqrt(1 + beta (omega dt)^2), Newmark's beta = 1/2."""
-    order, ratio, _ = case.in_time((30, 60), 2)
-    assert order.series is not None
-    exact = float(order.series.values[-1]) / float(ratio.value)
-    for steps, found in zip((30, 60), order.series.values, strict=True):
+    runs, ratio, _ = map(figure_of, case.in_time((30, 60), 2).values())
+    exact = runs.values[-1] / ratio.values
+    for steps, found in zip((30, 60), runs.values, strict=True):
         turn = 2.0 * np.pi / steps
         expected = exact * 2.0 * np.arcsin(0.5 * turn / np.sqrt(1.0 + 0.5 * turn**2)) / turn
         assert found == pytest.approx(expected, rel=3e-4)

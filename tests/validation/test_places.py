@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from flowborne_validation import worlds
-from flowborne_validation.findings import Grids, near
+from flowborne_validation.findings import Figure, Rule
 from flowborne_validation.worlds import PLACES, over_places
 
 
@@ -21,12 +21,12 @@ def test_places_and_their_mirror_images_are_evenly_apart(axis: int) -> None:
 
 
 def test_the_mean_over_places_is_judged_and_the_spread_is_said() -> None:
-    grids = Grids("cells across D", (8, 16))
-    found = near("drag", [(1.0, 1.2, 1.4), (1.3,)], 1.25, grids, relative=0.05)
-    assert (found.value, found.passed) == (1.3, True)
-    assert found.series is not None
-    assert found.series.values == pytest.approx([1.2, 1.3])
-    first, last, *_ = found.series.lines()
+    rule = Rule(relative=0.05)
+    value, series = rule.value_of(Figure([(1.0, 1.2, 1.4), (1.3,)], (8, 16)), 1.25)
+    assert (value, rule.accepts(value, 1.25, series)) == (1.3, True)
+    assert series is not None
+    assert series.values == pytest.approx([1.2, 1.3])
+    first, last, *_ = series.lines()
     assert first.endswith("mean of 3 places with a spread of 0.4, from 1 to 1.4")
     assert ", in one place, from 1.3 to 1.3" in last
 

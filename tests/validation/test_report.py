@@ -50,7 +50,7 @@ def result(
     lines = [] if series else ["<all the way>"]
     finest = tier is case(name).full
     judged = (1.01, 1.0, "2 %", verdict)
-    return Result(name, tier, "", quantity, *judged, lines, 3.0, finest, series, PLOT)
+    return Result(name, tier, quantity, *judged, lines, 3.0, finest, series, PLOT)
 
 
 def test_cases_come_one_by_one_in_the_order_of_the_list(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from flowborne_validation import rexeel
+from flowborne_validation.cases import case
 from flowborne_validation.rexeel import (
     LINK_LENGTH,
     MASS,
@@ -73,7 +74,7 @@ def test_R1_robot_swims_nearer_to_the_real_one_than_to_its_own_start(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(rexeel, "swim", swim)
-    found = rexeel.compared(20, (61,))
+    found = case("R1").judge(rexeel.compared(20, (61,)))
     for finding, still, least in zip(found, STILL[20], MEAN[20], strict=True):
         assert isinstance(finding.value, float)
         assert least < finding.value < 0.8 * still, finding.quantity

@@ -11,7 +11,7 @@ import pytest
 from flowborne.machine import cores
 from flowborne_validation.case import THE_RUN, Case, Result, Tier
 from flowborne_validation.cases import case, case_ids
-from flowborne_validation.findings import Finding, GridSeries
+from flowborne_validation.findings import Figure, Figures, Rule
 from flowborne_validation.page import PAGE
 from flowborne_validation.report import read_report
 from flowborne_validation.running import batches, run_cases, side_by_side
@@ -19,22 +19,19 @@ from flowborne_validation.running import batches, run_cases, side_by_side
 MINUTE, HALF_HOUR, ALL = Tier
 
 
-def measured(quick: bool) -> list[Finding]:
-    """A finding that says which run it is of."""
-    return [Finding("run", "quick" if quick else "full", "", "", True)]
+def known(quick: Tier = MINUTE, full: Tier = ALL) -> Case:
+    """A case whose figure says which run it is of."""
+    return Case("B1", {quick: [lambda: {"run": 1.0}], full: [lambda: {"run": 2.0}]}, {"*": Rule()})
 
 
 def test_a_tier_takes_in_the_smaller_ones() -> None:
-    known = Case("B1", measured, quick=MINUTE, full=ALL)
-    assert [known.tier_in(tier) for tier in Tier] == [MINUTE, MINUTE, ALL]
-    known = Case("B1", measured, quick=HALF_HOUR, full=ALL)
-    assert [known.tier_in(tier) for tier in Tier] == [None, HALF_HOUR, ALL]
+    assert [known(MINUTE, ALL).tier_in(tier) for tier in Tier] == [MINUTE, MINUTE, ALL]
+    assert [known(HALF_HOUR, ALL).tier_in(tier) for tier in Tier] == [None, HALF_HOUR, ALL]
 
 
 def test_a_result_says_its_tier() -> None:
-    known = Case("B1", measured, quick=HALF_HOUR, full=ALL)
-    told = [(r.tier, r.value) for quick in (True, False) for r in known.run(quick)]
-    assert told == [(HALF_HOUR, "quick"), (ALL, "full")]
+    told = [(r.tier, r.value) for q in (True, False) for r in known(HALF_HOUR, ALL).run(q)]
+    assert told == [(HALF_HOUR, 1.0), (ALL, 2.0)]
 
 
 @pytest.mark.parametrize(
@@ -57,12 +54,14 @@ def test_a_result_says_its_tier() -> None:
 def test_coarse_is_what_fails_on_grids_too_coarse_for_it(
     grids: bool, quick: bool, passed: bool, series: bool, verdict: str
 ) -> None:
-    errors = GridSeries("cells across D", (4, 8), (1.0, 1.1), (0.3, 0.2)) if series else None
+    value = 1.3 if passed else 1.1
 
-    def found(quick: bool) -> list[Finding]:
-        return [Finding("drag", 1.1, 1.3, "1 %", passed, errors)]
+    def found() -> Figures:
+        figure = Figure((1.0, value), (4, 8), on="cells across D") if series else Figure(value)
+        return {"drag": figure}
 
-    (result,) = Case("B1", found, coarse=grids).run(quick)
+    rules = {"drag": Rule(reference=1.3, relative=0.01)}
+    (result,) = Case("B1", {MINUTE: [found], ALL: [found]}, rules, coarse=grids).run(quick)
     assert (result.verdict, result.finest) == (verdict, not quick)
     assert result.grid == ("8 cells across D" if series else None)
     row = result.as_dict()
@@ -71,16 +70,16 @@ def test_coarse_is_what_fails_on_grids_too_coarse_for_it(
 
 
 def test_every_case_has_two_tiers_the_shorter_run_first() -> None:
-    for known in map(case, case_ids()):
-        assert known.quick is not known.full
-        assert known.quick.within(known.full), known.id
+    for found in map(case, case_ids()):
+        assert found.quick is not found.full
+        assert found.quick.within(found.full), found.id
 
 
 def test_a_case_that_raises_is_a_failed_result_with_its_message() -> None:
-    def broken(quick: bool) -> list[Finding]:
+    def broken() -> Figures:
         raise KeyError("arm")
 
-    (result,) = Case("B1", broken).run()
+    (result,) = Case("B1", {MINUTE: [broken], ALL: [broken]}, {}).run()
     assert (result.quantity, result.verdict) == (THE_RUN, "fail")
     assert str(result.value).startswith("KeyError: 'arm' (test_running.py, line ")
 

@@ -7,6 +7,7 @@ import pytest
 
 from flowborne import Array
 from flowborne_validation import controller_in_flow, scatter
+from flowborne_validation.cases import case
 
 
 def test_K12_scatter_is_what_no_smooth_curve_has() -> None:
@@ -44,8 +45,8 @@ def test_K12_a_capsule_scatters_less_on_the_finer_grid(
         return -500.0 * (1.0 + (0.03 if cells == 64 else fine) * (-1.0) ** np.arange(angles.size))
 
     monkeypatch.setattr(scatter, "settled", alternating)
-    found = scatter.scatter_over_poses(False)
-    assert [f.passed for f in found] == passed
+    found = case("K12").run()
+    assert [result.verdict == "pass" for result in found] == passed
     assert found[0].value == pytest.approx(fine, rel=0.05)
 
 
@@ -58,12 +59,12 @@ def test_K13_the_final_pose_may_be_on_either_side_but_not_anywhere(
         return controller_in_flow.judged(np.full(20, final), 1.0)
 
     monkeypatch.setattr(scatter, "course", ending)
-    mean, deviation = scatter.scatter_over_starts(False)
+    mean, deviation = case("K13").run()
     assert (mean.value, deviation.value) == (pytest.approx(82.0), pytest.approx(0.0))
-    assert (mean.passed, deviation.passed) == (True, True)
-    mean, deviation = scatter.scatter_over_starts(True)
+    assert (mean.verdict, deviation.verdict) == ("pass", "pass")
+    mean, deviation = case("K13").run(quick=True)
     assert (mean.value, deviation.value) == (pytest.approx(45.0), pytest.approx(10.5, abs=0.1))
-    assert (mean.passed, deviation.passed) == (False, False)
+    assert (mean.verdict, deviation.verdict) == ("coarse", "coarse")
 
 
 def test_K13_starts_where_asked() -> None:

@@ -6,7 +6,6 @@ One step from rest is enough: the cases are about the first acceleration.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 
 import numpy as np
 import trimesh
@@ -15,8 +14,8 @@ from scipy.spatial import ConvexHull, HalfspaceIntersection
 from flowborne import Array, Grid
 from flowborne.bodies import JointCommand
 from flowborne.worlds import Boundaries, advance, make_world
-from flowborne_validation.case import Case, reference, table
-from flowborne_validation.findings import Finding, Grids, GridSeries, at_most, falling, near
+from flowborne_validation.case import reference, table
+from flowborne_validation.findings import Figure, Figures
 from flowborne_validation.worlds import Vector, mjcf, ring_of_boxes, square
 
 DT = 1e-3
@@ -29,9 +28,6 @@ WALLS = Boundaries()
 
 UP: Vector = (0.0, 1.0, 0.0)
 SIDEWAYS: Vector = (1.0, 0.0, 0.0)
-
-Cells = Sequence[int]
-"""Cells across the body, from coarse to fine."""
 
 
 def oblong(cells: int) -> Grid:
@@ -76,6 +72,18 @@ def coefficient(grid: Grid, geom: str, direction: Vector = UP, walls: str = "") 
     return (1.0 - LIGHT) / rise(grid, geom, LIGHT, direction, walls) - LIGHT
 
 
+def contained(
+    cells: int,
+    width: float,
+    box: Callable[[int], Grid] = square,
+    direction: Vector = UP,
+    walls: str = "",
+) -> float:
+    """Ca of a cylinder or a sphere of a diameter `width` (m), `cells` across it, in a container of
+    1 m."""
+    return coefficient(box(round(cells / width)), round_body(width), direction, walls)
+
+
 def turned(grid: Grid, geom: str) -> float:
     """Added moment of inertia about the origin over the fluid's density, m^4."""
     return -float(started(grid, geom, 'axis="0 0 1"')[5])
@@ -99,90 +107,61 @@ def started(grid: Grid, geom: str, joint: str, sides: Boundaries = WALLS) -> Arr
     return advance(world, DT, command=command).pressure_wrench[1]
 
 
-def judged(title: str, on: Grids, values: Sequence[float], exact: float) -> Finding:
-    """A finding within 1 % of its reference on the finest grid."""
-    return near(title, GridSeries.toward(on, values, exact, relative=True), exact, relative=0.01)
-
-
-def contained(
-    title: str,
-    exact: float,
-    cells: Cells,
-    width: float,
-    box: Callable[[int], Grid] = square,
-    direction: Vector = UP,
-    walls: str = "",
-) -> Finding:
-    """Ca of a cylinder or a sphere of a diameter `width` (m) in a container of 1 m."""
-    values = [
-        coefficient(box(round(n / width)), round_body(width), direction, walls) for n in cells
-    ]
-    return judged(f"Ca of a {title}", Grids("cells across D", cells), values, exact)
-
-
-LONGWISE = "cells along the long axis"
-
-
-def across(quick: bool) -> Cells:
-    """Cells across a cylinder in a container."""
-    return (8, 16, 32) if quick else (8, 16, 32, 64)
-
-
-def squares(quick: bool) -> list[Finding]:
-    """Cylinder in a square."""
+def squares(cells: int, least: float) -> Figures:
+    """Cylinder in a square, for D/L from the least on."""
     rows = table("I2", "cylinder in closed square, Ca vs D/L").items()
-    return [
-        contained(f"cylinder in a square, D/L = {d:g}", exact, across(quick), 1.0 / round(1.0 / d))
+    return {
+        f"Ca of a cylinder in a square, D/L = {d:g}": Figure(
+            contained(cells, 1.0 / round(1.0 / d)), reference=exact
+        )
         for d, exact in rows
-        if not (quick and d < 0.2)
-    ]
+        if d >= least
+    }
 
 
-def oblongs(quick: bool) -> list[Finding]:
-    """Cylinder in a box twice as long as wide."""
+def oblongs(cells: int, least: float) -> Figures:
+    """Cylinder in a box twice as long as wide, for D/L from the least on."""
     name = "cylinder in 1x2 box (width 1): [moving across, moving along the long side]"
-    findings = []
-    for key, pair in reference("I2", name).items():
-        width = float(key.removeprefix("D/L="))
-        if quick and width < 0.5:
-            continue
-        for side, direction, exact in zip(("across", "along"), (SIDEWAYS, UP), pair, strict=True):
-            title = f"cylinder {side} a 1 x 2 box, D/L = {width:g}"
-            findings.append(contained(title, exact, across(quick), width, oblong, direction))
-    return findings
+    rows = {float(key.removeprefix("D/L=")): pair for key, pair in reference("I2", name).items()}
+    return {
+        f"Ca of a cylinder {side} a 1 x 2 box, D/L = {width:g}": Figure(
+            contained(cells, width, oblong, direction), reference=exact
+        )
+        for width, pair in rows.items()
+        if width >= least
+        for side, direction, exact in zip(("across", "along"), (SIDEWAYS, UP), pair, strict=True)
+    }
 
 
 LONG, SHORT = 0.1, 0.05
 """Semi-axes of the list's ellipse, m."""
 
+SHELL = 0.4
+"""Radius of the fixed shells, m."""
 
-def ellipse_in_box(quick: bool) -> list[Finding]:
+
+def ellipse_in_box(cells: int) -> Figures:
     """Ellipse along both axes and turning."""
-    grids = Grids(LONGWISE, (16, 32, 64) if quick else (16, 32, 64, 128))
     along, broadside, rotating = reference("I2", "ellipse 2:1 (a=0.1,b=0.05) in unit box")
-    unbounded = np.pi / 8.0 * (LONG**2 - SHORT**2) ** 2
-    boxes = [square(round(n / (2.0 * LONG))) for n in grids.cells]
-    geom = ellipse(LONG, SHORT)
-    rows = (
-        ("Ca along its long axis", along, [coefficient(g, geom, SIDEWAYS) for g in boxes]),
-        ("Ca across", broadside, [coefficient(g, geom, UP) for g in boxes]),
-        ("I_a over the unbounded one", rotating, [turned(g, geom) / unbounded for g in boxes]),
-    )
-    return [
-        judged(f"ellipse in a box, {label}", grids, values, exact) for label, exact, values in rows
-    ]
+    box, geom = square(round(cells / (2.0 * LONG))), ellipse(LONG, SHORT)
+    inertia = turned(box, geom) / turning(LONG, SHORT)
+    title = "ellipse in a box, "
+    return {
+        f"{title}Ca along its long axis": Figure(coefficient(box, geom, SIDEWAYS), (), along),
+        f"{title}Ca across": Figure(coefficient(box, geom, UP), (), broadside),
+        f"{title}I_a over the unbounded one": Figure(inertia, (), rotating),
+    }
 
 
-def cubes(quick: bool) -> list[Finding]:
-    """Sphere in a cube; the finest grid of the smallest sphere has 160^3 cells."""
-    findings = []
-    for ratio, exact in table("I2", "sphere in closed cube, Ca vs D/L").items():
-        if quick and ratio < 0.3:
-            continue
-        cells = (8, 16) if quick or ratio < 0.15 else (8, 16, 32)
-        title = f"sphere in a cube, D/L = {ratio:g}"
-        findings.append(contained(title, exact, cells, 1.0 / round(1.0 / ratio), cube))
-    return findings
+def cubes(cells: int, least: float, below: float) -> Figures:
+    """Sphere in a cube, for D/L from the least on and below a bound."""
+    return {
+        f"Ca of a sphere in a cube, D/L = {ratio:g}": Figure(
+            contained(cells, 1.0 / round(1.0 / ratio), cube), reference=exact
+        )
+        for ratio, exact in table("I2", "sphere in closed cube, Ca vs D/L").items()
+        if least <= ratio < below
+    }
 
 
 def round_wall(radius: float, sides: int = 128) -> str:
@@ -209,26 +188,23 @@ def ball_of_boxes(radius: float) -> str:
     return "".join(geoms)
 
 
-def shells(quick: bool) -> list[Finding]:
-    """Cylinder and sphere in the middle of a fixed shell."""
-    findings = []
-    outer = 0.4
-    ring = round_wall(outer)
-    for ratio in (2.0,) if quick else (2.0, 3.0, 4.0):
-        exact = (ratio**2 + 1.0) / (ratio**2 - 1.0)
-        title = f"cylinder in a concentric shell, b/a = {ratio:g}"
-        width = 2.0 * outer / ratio
-        findings.append(contained(title, exact, across(quick), width, walls=ring))
-    if not quick:
-        exact = (2.0**3 + 2.0) / (2.0 * (2.0**3 - 1.0))
-        title, ball = "sphere in a concentric shell, b/a = 2", ball_of_boxes(outer)
-        findings.append(contained(title, exact, (8, 16, 32), outer, cube, walls=ball))
-    return findings
+def shells(cells: int, ratios: Sequence[float]) -> Figures:
+    """Cylinder in the middle of a fixed shell."""
+    ring = round_wall(SHELL)
+    return {
+        f"Ca of a cylinder in a concentric shell, b/a = {ratio:g}": Figure(
+            contained(cells, 2.0 * SHELL / ratio, walls=ring),
+            reference=(ratio**2 + 1.0) / (ratio**2 - 1.0),
+        )
+        for ratio in ratios
+    }
 
 
-def containers(quick: bool) -> list[Finding]:
-    """I2: bodies in closed boxes and shells."""
-    return squares(quick) + oblongs(quick) + ellipse_in_box(quick) + cubes(quick) + shells(quick)
+def ball(cells: int) -> Figures:
+    """Sphere in the middle of a fixed shell."""
+    found = contained(cells, SHELL, cube, walls=ball_of_boxes(SHELL))
+    exact = (2.0**3 + 2.0) / (2.0 * (2.0**3 - 1.0))
+    return {"Ca of a sphere in a concentric shell, b/a = 2": Figure(found, reference=exact)}
 
 
 FLAT_IMAGES = 3.438 / (2.0 * np.pi)
@@ -254,42 +230,40 @@ def free_rise(measured: float, ratio: float, displaced: float, solid: bool) -> f
     return (1.0 - ratio) / (ratio + free)
 
 
-def density_ratios(quick: bool) -> list[Finding]:
+def density_ratios(names: Sequence[str]) -> Figures:
     """Accelerations of the list's tables, downward positive, and their limits."""
-    findings = []
-    for name, solid, limit in (("cylinder", False, -1.0), ("sphere", True, -2.0)):
-        if quick and solid:
-            continue
+    found: dict[str, float | Figure] = {}
+    for name in names:
+        solid = name == "sphere"
         width = 1.0 / 3.0 if solid else 0.25
         grid = (cube if solid else square)(round(32 / width))
         displaced = np.pi * width**3 / 6.0 if solid else np.pi * width**2 / 4.0
         rows = table("I1", f"table a/g {'(down +) ' if not solid else ''}{name}")
-        for ratio, exact in (rows | {1e-6: limit, 1e6: 1.0}).items():
+        for ratio, exact in (rows | {1e-6: -2.0 if solid else -1.0, 1e6: 1.0}).items():
             measured = rise(grid, round_body(width), ratio)
             if ratio == 1.0:
-                findings.append(at_most(f"a/g of a neutral {name}", measured, 1e-10))
+                found[f"a/g of a neutral {name}"] = measured
                 continue
-            found = -free_rise(measured, ratio, displaced, solid)
             title = f"a/g of a {name}, rho_s/rho_f = {ratio:g}, 32 cells across D"
-            findings.append(near(title, found, exact, relative=0.01))
-    return findings
+            free = -free_rise(measured, ratio, displaced, solid)
+            found[title] = Figure(free, reference=exact)
+    return found
 
 
-def ellipses(quick: bool) -> list[Finding]:
+def ellipses(cells: int) -> Figures:
     """Rise of an ellipse along both axes, and its added moment of inertia."""
-    grids = Grids(LONGWISE, (16, 32) if quick else (32, 64, 128))
-    geom, area = ellipse(LONG, SHORT), np.pi * LONG * SHORT
-    boxes = [square(round(n / (2.0 * LONG))) for n in grids.cells]
-    rows = reference("I1", "rise a/g for rho_s/rho_f=0.01")
-    findings = []
+    geom, area, box = (
+        ellipse(LONG, SHORT),
+        np.pi * LONG * SHORT,
+        square(round(cells / (2.0 * LONG))),
+    )
+    found: dict[str, float | Figure] = {}
     for axis, direction in (("a=2b along long axis", SIDEWAYS), ("across", UP)):
-        rises = [rise(box, geom, LIGHT, direction) for box in boxes]
-        values = [free_rise(found, LIGHT, area, False) for found in rises]
-        title = f"rise over g of an ellipse {axis}"
-        findings.append(judged(title, grids, values, rows[f"ellipse {axis}"]))
-    inertia = turning(LONG, SHORT)
-    values = [free_turning(turned(box, geom), LONG, SHORT) / inertia for box in boxes]
-    return [*findings, judged("I_a of an ellipse over rho pi/8 (a^2-b^2)^2", grids, values, 1.0)]
+        free = free_rise(rise(box, geom, LIGHT, direction), LIGHT, area, False)
+        exact = reference("I1", "rise a/g for rho_s/rho_f=0.01")[f"ellipse {axis}"]
+        found[f"rise over g of an ellipse {axis}"] = Figure(free, reference=exact)
+    inertia = free_turning(turned(box, geom), LONG, SHORT) / turning(LONG, SHORT)
+    return {**found, "I_a of an ellipse over rho pi/8 (a^2-b^2)^2": inertia}
 
 
 def turning(a: float, b: float) -> float:
@@ -310,42 +284,37 @@ def free_turning(boxed: float, a: float, b: float) -> float:
     return boxed / (1.0 + images * square(a, b) / turning(a, b))
 
 
-def spheroid(quick: bool) -> list[Finding]:
+def spheroid(cells: int) -> Figures:
     """A prolate spheroid twice as long as wide, along its axis."""
-    grids = Grids("cells along the axis", (16, 32) if quick else (16, 32, 64))
     length, width = 0.4, 0.2
     e = np.sqrt(1.0 - (width / length) ** 2)
     a0 = 2.0 * (1.0 - e**2) / e**3 * (np.arctanh(e) - e)
-    exact = float(a0 / (2.0 - a0))
     volume = np.pi / 6.0 * length * width**2
     geom = f'<geom type="ellipsoid" size="{0.5 * width} {0.5 * length} {0.5 * width}"/>'
-    boxed = [coefficient(cube(round(n / length)), geom) for n in grids.cells]
-    values = [unbounded(ca * volume, volume, solid=True) / volume for ca in boxed]
-    return [judged("Ca of a prolate spheroid 2:1 along its axis", grids, values, exact)]
+    ca = coefficient(cube(round(cells / length)), geom)
+    free = unbounded(ca * volume, volume, solid=True) / volume
+    exact = float(a0 / (2.0 - a0))
+    return {"Ca of a prolate spheroid 2:1 along its axis": Figure(free, reference=exact)}
 
 
 THIN = 1e-4
 """Half thickness of plate and disc, m."""
 
 
-def plates(quick: bool) -> list[Finding]:
+def plates(cells: int) -> Figures:
     """A plate across, along and turning; in the fluid it is 1.4 cells thick, so the order is 1."""
     half = 0.2
-    cells = (16, 32, 64) if quick else (64, 128, 256, 512, 1024)
-    grids = Grids("cells across the plate", cells)
-    geom = f'<geom type="box" size="{half} {THIN} 1"/>'
-    displaced, circle = 4.0 * half * THIN, np.pi * half**2
-    boxes = [square(round(n / (2.0 * half))) for n in cells]
+    geom, box = f'<geom type="box" size="{half} {THIN} 1"/>', square(round(cells / (2.0 * half)))
     broadside, along = (
-        [unbounded(pushed(box, geom, direction), displaced) / circle for box in boxes]
+        unbounded(pushed(box, geom, direction), 4.0 * half * THIN) / (np.pi * half**2)
         for direction in (UP, SIDEWAYS)
     )
-    rotating = [free_turning(turned(box, geom), half, 0.0) / turning(half, 0.0) for box in boxes]
-    return [
-        judged("m_a of a plate across over rho pi a^2", grids, broadside, 1.0),
-        judged("I_a of a plate over rho pi a^4/8", grids, rotating, 1.0),
-        at_most("m_a of a plate along over rho pi a^2", along, 0.01, grids),
-    ]
+    rotating = free_turning(turned(box, geom), half, 0.0) / turning(half, 0.0)
+    return {
+        "m_a of a plate across over rho pi a^2": broadside,
+        "I_a of a plate over rho pi a^4/8": rotating,
+        "m_a of a plate along over rho pi a^2": along,
+    }
 
 
 def quarter(cells: int) -> Grid:
@@ -354,32 +323,23 @@ def quarter(cells: int) -> Grid:
     return Grid((cells // 2, cells, cells // 2), 1.0 / cells, (0.0, -0.5, 0.0))
 
 
-def without_thickness(cells: Cells, values: Sequence[float]) -> float:
+def without_thickness(cells: Sequence[int], values: Sequence[float]) -> float:
     """Limit of values on three grids for no thickness in the fluid, which is proportional to e =
     1/cells. The flow round a thin rim of any shape adds terms in e ln e and e."""
     e = 1.0 / np.array(cells)
     return float(np.linalg.solve(np.column_stack([e**0, e * np.log(e), e]), values)[0])
 
 
-def disc(quick: bool) -> list[Finding]:
+def disc(cells: Sequence[int]) -> Figures:
     """A disc broadside, and its limit for no thickness, as in the list. In the fluid it is 1.75
     cells thick, and a disc of this thickness has the added mass of the series."""
     half = 0.2
-    cells = (24, 48, 96) if quick else (32, 64, 128)
     geom = f'<geom type="cylinder" size="{half} {THIN}" zaxis="0 1 0"/>'
     displaced, exact = 2.0 * THIN * np.pi * half**2, 8.0 / 3.0 * half**3
     added = [4.0 * pushed(quarter(round(n / (2.0 * half))), geom, UP) for n in cells]
     values = [unbounded(mass, displaced, solid=True) / exact for mass in added]
-    title = "m_a of a disc broadside over 8/3 rho a^3"
-    thick = judged(title, Grids("cells across the disc", cells), values, 1.0)
-    name, value = f"{title}, continued to no thickness", without_thickness(cells, values)
-    limit = near(name, value, 1.0, relative=0.01)
-    return [thick, falling(replace(limit, series=thick.series))]
-
-
-def unbounded_bodies(quick: bool) -> list[Finding]:
-    """I1: bodies corrected for their container."""
-    return density_ratios(quick) + ellipses(quick) + spheroid(quick) + plates(quick) + disc(quick)
-
-
-CASES = (Case("I1", unbounded_bodies, coarse=True), Case("I2", containers))
+    title, limit = "m_a of a disc broadside over 8/3 rho a^3", without_thickness(cells, values)
+    return {
+        title: Figure(values, cells),
+        f"{title}, continued to no thickness": Figure(values, cells, value=limit),
+    }

@@ -1,11 +1,12 @@
-"""The cases of the reference list, their references, and the results of their runs."""
+"""The cases of the reference list: their references, rules, runs and results."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from enum import StrEnum
+from fnmatch import fnmatchcase
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -15,7 +16,17 @@ from typing import Any
 
 import numpy as np
 
-from flowborne_validation.findings import Curve, Finding, GridSeries, Plot, Value, Verdict
+from flowborne_validation.findings import (
+    Curve,
+    Figure,
+    Figures,
+    GridSeries,
+    Plot,
+    Rule,
+    Value,
+    Verdict,
+    figure_of,
+)
 
 THE_RUN = "the run"
 """Quantity of a case whose run broke down, without figures."""
@@ -72,35 +83,35 @@ def table(case: str, quantity: str) -> dict[float, Any]:
     return {float(key): value for key, value in reference(case, quantity).items()}
 
 
-def confirmed(case: str, quantity: str) -> bool:
-    """Whether a quantity's value was checked at its source, or derived."""
-    return quantity not in entry(case).memory
-
-
 @dataclass(frozen=True)
 class Result:
-    """A finding of a case.
+    """A judged quantity of a case.
 
     id        of the case in the reference list
     tier      of the run
     quantity  of the case
+    value     measured
+    lines     details for people
     seconds   of the whole run
     finest    whether the run is the longest of its case, with its finest grids
     """
 
     id: str
     tier: Tier
-    title: str
     quantity: str
     value: Value
     reference: Value
-    tolerance: Value
+    tolerance: str
     verdict: Verdict
-    lines: list[str]
+    lines: Sequence[str]
     seconds: float
     finest: bool
     series: GridSeries | None = None
     plot: Plot | None = None
+
+    @property
+    def title(self) -> str:
+        return f"{entry(self.id).name}: {self.quantity}"
 
     @property
     def grid(self) -> str | None:
@@ -118,7 +129,7 @@ class Result:
     @classmethod
     def from_dict(cls, row: dict[str, Any]) -> Result:
         """The result that `as_dict` gave."""
-        found = {name: value for name, value in row.items() if name != "grid"}
+        found = {name: value for name, value in row.items() if name not in ("title", "grid")}
         if "series" in row:
             given = {name: value for name, value in row["series"].items() if name != "order"}
             found["series"] = GridSeries(**given)
@@ -130,22 +141,31 @@ class Result:
 
 @dataclass(frozen=True)
 class Case:
-    """A case of the reference list.
+    """A case of the reference list, as the table of cases has it.
 
-    id       in the list
-    measure  runs the case and returns its findings; True for coarser grids and shorter runs
-    quick    smallest tier with the shorter run
-    full     smallest tier with the whole run
-    coarse   whether the shorter run's grids are too coarse for the tolerances of the source
-    alone    whether it measures seconds, so that no other case may run at the same time
+    id      in the list
+    runs    tier -> functions that measure; of two tiers, first that with the shorter run on coarser
+            grids
+    rules   quantity, in which * stands for any text -> how it is judged; the first that fits counts
+    coarse  whether the shorter run's grids are too coarse for the tolerances of the source
+    alone   whether it measures seconds, so that no other case may run at the same time
     """
 
     id: str
-    measure: Callable[[bool], list[Finding]]
-    quick: Tier = Tier.MINUTE
-    full: Tier = Tier.ALL
+    runs: Mapping[Tier, Sequence[Callable[[], Figures]]]
+    rules: Mapping[str, Rule]
     coarse: bool = False
     alone: bool = False
+
+    @property
+    def quick(self) -> Tier:
+        """The smallest tier with the shorter run."""
+        return next(iter(self.runs))
+
+    @property
+    def full(self) -> Tier:
+        """The smallest tier with the whole run."""
+        return tuple(self.runs)[1]
 
     @property
     def title(self) -> str:
@@ -159,37 +179,43 @@ class Case:
     def run(self, quick: bool = False) -> list[Result]:
         """Measure and judge. A run that breaks down is a failed result, with the cause."""
         started = perf_counter()
+        found: dict[str, float | Figure] = {}
         try:
-            findings = self.measure(quick)
+            for measure in self.runs[self.quick if quick else self.full]:
+                found.update(measure())
         except Exception as error:  # the other cases continue
             return [self.broken(quick, _cause(error), perf_counter() - started)]
-        seconds = perf_counter() - started
-        return [self._result(finding, quick, seconds) for finding in findings]
+        return self.judge(found, quick, perf_counter() - started)
 
     def broken(self, quick: bool, cause: str, seconds: float = 0.0) -> Result:
         """The failed result of a run without figures."""
-        return self._result(Finding(THE_RUN, cause, "ends", "", False), quick, seconds)
+        tier = self.quick if quick else self.full
+        return Result(self.id, tier, THE_RUN, cause, "ends", "", "fail", [], seconds, not quick)
 
-    def _result(self, finding: Finding, quick: bool, seconds: float) -> Result:
-        verdict = finding.verdict(coarse=quick and self.coarse)
-        lines = [] if finding.series is None else finding.series.lines()
-        if verdict == "coarse":
+    def judge(self, found: Figures, quick: bool = False, seconds: float = 0.0) -> list[Result]:
+        """Judge figures by the table. Only one with a grid series can be coarse; all others hold on
+        any grid."""
+        return [self._result(name, figure_of(f), quick, seconds) for name, f in found.items()]
+
+    def _result(self, quantity: str, figure: Figure, quick: bool, seconds: float) -> Result:
+        rule = next(rule for name, rule in self.rules.items() if fnmatchcase(quantity, name))
+        rule, listed = replace(rule, **figure.judged), entry(self.id)
+        exact = rule.reference_of(quantity, figure, listed.quantities)
+        value, series = rule.value_of(figure, exact)
+        exact = exact if rule.order is None else rule.order
+        lines = [] if series is None else series.lines()
+        verdict: Verdict = "pass"
+        if (rule.known or quantity) in listed.memory:
+            verdict = "unconfirmed"
+        elif not rule.accepts(value, exact, series):
+            verdict = "fail"
+        if verdict == "fail" and quick and self.coarse and series is not None:
+            verdict = "coarse"
             lines.append(f"coarse: the case is judged on finer grids, by --tier {self.full.value}")
-        return Result(
-            self.id,
-            self.quick if quick else self.full,
-            f"{self.title}: {finding.quantity}",
-            finding.quantity,
-            finding.value,
-            finding.reference,
-            finding.tolerance,
-            verdict,
-            [*lines, *finding.lines],
-            seconds,
-            not quick,
-            finding.series,
-            finding.plot,
-        )
+        lines += figure.lines
+        tier, judged = self.quick if quick else self.full, (value, exact, rule.accepted, verdict)
+        found = (*judged, lines, seconds, not quick, series, figure.plot)
+        return Result(self.id, tier, quantity, *found)
 
 
 def _cause(error: Exception) -> str:

@@ -1,42 +1,60 @@
-"""The cases of the reference list, by id."""
+"""The table of cases, in the order of the reference list."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import tomllib
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import cache, partial
 from importlib import import_module
+from importlib.resources import files
+from typing import Any
 
-from flowborne_validation.case import Case, entries
+from flowborne_validation.case import Case, Rule, Tier, entries
+from flowborne_validation.findings import Figures, figure_of, over
 
-MODULES = {
-    "added_mass": ("I1", "I2"),
-    "articulated": ("A1", "A2", "A3", "A4"),
-    "cavity": ("F2",),
-    "channel_cylinder": ("B1", "B2", "B3"),
-    "controller": ("K1", "K2", "K3", "K4"),
-    "controller_in_flow": ("K5", "K6"),
-    "creatures": ("K11",),
-    "fishrobot": ("R2",),
-    "flag_in_channel": ("D2", "D3"),
-    "flag_lift": ("D6",),
-    "flapping_ellipse": ("S3",),
-    "flesh": ("D1", "D4", "D5"),
-    "far_sides": ("I10",),
-    "fluid_cases": ("F1", "F3", "F6", "F7"),
-    "gradients": ("K7",),
-    "human": ("K8", "K9", "K10"),
-    "hydrostatics": ("F5",),
-    "inviscid": ("I4", "I6", "I7", "I8", "I9"),
-    "moving_cylinder": ("V3", "V5", "V8"),
-    "open_water": ("B4", "B5", "B6", "B7", "V9"),
-    "rexeel": ("R1",),
-    "scalar_cases": ("F4",),
-    "scatter": ("K12", "K13"),
-    "sea": ("B8", "I11"),
-    "settling": ("V1", "V2"),
-    "small_domains": ("I12",),
-    "swimmers": ("S1", "S5"),
-}
-"""Module -> its cases; a module is imported when one of them is run."""
+
+@cache
+def cases() -> dict[str, Case]:
+    """Every case by its id, from cases.toml."""
+    text = files("flowborne_validation").joinpath("cases.toml").read_text(encoding="utf-8")
+    rows: dict[str, Any] = tomllib.loads(text)
+    coarse, alone = rows.pop("coarse"), rows.pop("alone")
+    return {
+        name: case_of(name, module, dict(row), name in coarse, name in alone)
+        for module, some in rows.items()
+        for name, row in some.items()
+    }
+
+
+def case_of(name: str, module: str, row: dict[str, Any], coarse: bool, alone: bool) -> Case:
+    """The case of a row of the table."""
+    on, tiers = row.pop("on", ""), [tier.value for tier in Tier]
+    runs: dict[Tier, list[Callable[[], Figures]]] = {}
+    rules = {}
+    for key, entry in row.items():
+        for part in entry if isinstance(entry, list) else [entry]:
+            if not part.keys() & set(tiers):
+                rules[key] = Rule(**part)
+            shared = {name: value for name, value in part.items() if name not in tiers}
+            for tier in (tier for tier in Tier if tier.value in part):
+                arguments = {"on": on} | shared | part[tier.value]
+                run = partial(measured, f"flowborne_validation.{module}", key, **arguments)
+                runs.setdefault(tier, []).append(run)
+    return Case(name, {tier: runs[tier] for tier in Tier if tier in runs}, rules, coarse, alone)
+
+
+def measured(
+    module: str, function: str, on: str, each: Sequence[Any] = (), **arguments: Any
+) -> Figures:
+    """Figures of a function of a module, which is imported for it.
+
+    on    unit of the grids
+    each  grids that the function measures one after the other
+    """
+    measure = partial(getattr(import_module(module), function), **arguments)
+    found: Figures = over(each, measure) if each else measure()
+    return {name: replace(figure_of(figure), on=on) for name, figure in found.items()}
 
 
 def case_ids() -> Sequence[str]:
@@ -46,7 +64,4 @@ def case_ids() -> Sequence[str]:
 
 def case(name: str) -> Case:
     """The case with this id. Raises KeyError when there is none."""
-    of = {name: module for module, names in MODULES.items() for name in names}
-    module = import_module(f"flowborne_validation.{of[name]}")
-    found: dict[str, Case] = {c.id: c for c in module.CASES}
-    return found[name]
+    return cases()[name]

@@ -17,19 +17,17 @@ from flowborne.worlds import (
     advance,
     make_world,
 )
-from flowborne_validation.case import Case, Tier, reference
-from flowborne_validation.findings import Curve, Finding, Plot, falling
+from flowborne_validation.case import reference
+from flowborne_validation.findings import Curve, Figure, Figures, Plot, named
 from flowborne_validation.shedding import (
     AFTER,
     BEFORE,
     CFL,
-    PERIODS,
     Kicked,
     Stream,
     backflow,
     crest,
     cylinder,
-    judged,
     watch,
 )
 from flowborne_validation.worlds import PLACES, Parabola, Place, over_places, recorded, whole_steps
@@ -40,9 +38,9 @@ DIAMETER, CENTRE, LENGTH, HEIGHT = 0.1, 0.2, 2.2, 0.41
 VISCOSITY = 1e-3
 """Pa s; the fluid's density is 1 kg/m^3."""
 
-GRIDS, ONCE = {True: (10,), False: (10, 20, 40)}, (40,)
-"""Cells across D of B2 and B3, by quick: multiples of 10 fit the channel. The grid of B3 with one
-place, as it starts at rest in each and takes an hour."""
+ONCE = (40,)
+"""Cells across D of B3 with one place, as it starts at rest in each and takes an hour. Multiples of
+10 fit the channel."""
 
 CREEPING = Stream(DIAMETER, 0.2, 0.3)
 SHEDDING = Stream(DIAMETER, 1.0, 1.5)
@@ -105,9 +103,9 @@ def steady_flow(world: World, change: float) -> tuple[float, float, float]:
     return float(new[0]), float(new[1]), changed
 
 
-def steady_cylinder(quick: bool) -> list[Finding]:
+def steady_cylinder(grids: Sequence[int]) -> Figures:
     """B1: from the undisturbed flow on the coarsest grid, from the coarser one's on the others."""
-    grids, inflow = (10,) if quick else (20, 40, 80), Parabola(CREEPING.fastest)
+    inflow = Parabola(CREEPING.fastest)
     back = (CENTRE + 0.5 * DIAMETER, CENTRE, 0.0)
 
     def measure(world: World, first: bool) -> tuple[Sequence[float], str]:
@@ -115,20 +113,13 @@ def steady_cylinder(quick: bool) -> list[Finding]:
         figures = drag, lift, pressure_drop(world), backflow(world, back, 3.0 * DIAMETER)
         return figures, f"coefficients change by {change:.1g} in the last D/U"
 
-    build = partial(channel, inflow=inflow)
-    (drag, lift, drop, length), lines = over_places(grids, build, inflow, measure)
-    return [
-        falling(judged("B1", "cD", grids, drag, (5.57, 5.59), lines=lines)),
-        falling(judged("B1", "cL", grids, lift, (0.0104, 0.0110))),
-        judged("B1", "dp", grids, drop, (0.1172, 0.1176)),
-        judged("B1", "La", grids, length, (0.0842, 0.0852)),
-    ]
+    found, lines = over_places(grids, partial(channel, inflow=inflow), inflow, measure)
+    return named(("cD", "cL", "dp", "La"), found, grids, lines)
 
 
-def shedding_in_channel(quick: bool) -> list[Finding]:
+def shedding_in_channel(grids: Sequence[int], periods: int) -> Figures:
     """B2: largest coefficients over some periods, frequency, and the pressure drop half a period
     after the largest lift."""
-    grids, periods = GRIDS[quick], PERIODS[quick]
     inflow = Parabola(SHEDDING.fastest)
     field = Kicked(inflow, SHEDDING, CENTRE, CENTRE)
 
@@ -142,14 +133,8 @@ def shedding_in_channel(quick: bool) -> list[Finding]:
         figures = crest(drags[steps])[0], crest(lifts)[0], SHEDDING.time / period, fallen
         return figures, seen.unsteadiness(periods)
 
-    build = partial(channel, inflow=inflow)
-    (drag, lift, strouhal, drop), lines = over_places(grids, build, field, measure)
-    return [
-        falling(judged("B2", "cD max", grids, drag, (3.22, 3.24), lines=lines)),
-        falling(judged("B2", "cL max", grids, lift, (0.99, 1.01))),
-        falling(judged("B2", "St", grids, strouhal, (0.295, 0.305))),
-        judged("B2", "dp", grids, drop, (2.46, 2.50)),
-    ]
+    found, lines = over_places(grids, partial(channel, inflow=inflow), field, measure)
+    return named(("cD max", "cL max", "St", "dp"), found, grids, lines)
 
 
 def pulse(cells: int, place: Place, duration: float = DURATION) -> Array:
@@ -163,36 +148,22 @@ def pulse(cells: int, place: Place, duration: float = DURATION) -> Array:
     return recorded(world, dt, steps, figures)
 
 
-def swelling_inflow(quick: bool) -> list[Finding]:
+def swelling_inflow(grids: Sequence[int]) -> Figures:
     """B3: largest drag and lift in the pulse, and the pressure drop at its end."""
-    grids = GRIDS[quick]
     runs = [[pulse(n, place) for place in PLACES[: 1 if n in ONCE else None]] for n in grids]
     drags, lifts = ([[crest(run[:, c])[0] for run in some] for some in runs] for c in (1, 2))
     drops = [[float(run[-1, 3]) for run in some] for some in runs]
-    last = runs[-1][0]
-    # s at which the published drag and lift are largest
-    drag = course(last, 1, "drag coefficient", 3.93625, reference("B3", "cD max"))
-    lift = course(last, 2, "lift coefficient", 5.693125, reference("B3", "cL max"))
-    drop = course(last, 3, "pressure drop (Pa)", DURATION, reference("B3", "dp(t=8)"))
-    return [
-        judged("B3", "cD max", grids, drags, (2.93, 2.97), plot=drag),
-        judged("B3", "cL max", grids, lifts, (0.47, 0.49), plot=lift),
-        judged("B3", "dp(t=8)", grids, drops, (-0.115, -0.105), plot=drop),
-    ]
-
-
-def course(run: Array, column: int, name: str, time: float, published: float) -> Plot:
-    """Some hundred points of a column of a run over time, with the one published value."""
-    thinned = run[:: max(1, len(run) // 400)]
-    curves = (
-        Curve("published", (time,), (published,), True),
-        Curve("flowborne", thinned[:, 0], thinned[:, column]),
+    rows = (  # s at which the published ones are reached
+        ("cD max", drags, "drag coefficient", 3.93625),
+        ("cL max", lifts, "lift coefficient", 5.693125),
+        ("dp(t=8)", drops, "pressure drop (Pa)", DURATION),
     )
-    return Plot("t (s)", name, curves)
-
-
-CASES = (
-    Case("B1", steady_cylinder, coarse=True),
-    Case("B2", shedding_in_channel, Tier.HALF_HOUR, coarse=True),
-    Case("B3", swelling_inflow, Tier.HALF_HOUR, coarse=True),
-)
+    last, found = runs[-1][0], {}
+    thinned = last[:: max(1, len(last) // 400)]
+    for column, (quantity, values, name, time) in enumerate(rows, 1):
+        curves = (
+            Curve("published", (time,), (reference("B3", quantity),), True),
+            Curve("flowborne", thinned[:, 0], thinned[:, column]),
+        )
+        found[quantity] = Figure(values, grids, plot=Plot("t (s)", name, curves))
+    return found

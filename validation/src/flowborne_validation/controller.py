@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from importlib import resources
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -19,8 +20,7 @@ from flowborne.parts import (
     ObjectiveWindDrag,
 )
 from flowborne.worlds import make_world
-from flowborne_validation.case import Case
-from flowborne_validation.findings import Finding, at_most, near
+from flowborne_validation.findings import Figure, Figures
 from flowborne_validation.worlds import Vector, frames_of, mjcf
 
 G = 9.81
@@ -93,54 +93,51 @@ def landscape(world: World, controller: Controller, angles: Array) -> Array:
     return controller.trials(world, step).values(np.radians(angles - here)[:, None])
 
 
-def uniform_wind(quick: bool) -> list[Finding]:
-    """K1: least effort under gravity and a uniform force, with the objective's own law."""
+def uniform_wind(shares: Sequence[float], apart: float) -> Figures:
+    """K1: least effort under gravity and a uniform force, with the objective's own law, over angles
+    that are some degrees apart."""
     pace = 20.0 * FRAME
     effort = controller_of(ObjectiveEffort(HINGE), 1.0, pace, "present")
-    tolerance = 0.5 + pace
-    findings = []
-    for share in (0.5, 1.0) if quick else (0.1, 0.25, 0.5, 1.0, 2.0):
+    found: dict[str, float | Figure] = {}
+    for share in shares:
         wind = WindForce((share * WEIGHT, 0.0, 0.0))
         best = float(np.degrees(np.arctan(share)))
-        frames = round((best + 20.0) / pace) + 20
-        found = settled(block(0.0, G, wind), effort, frames)
+        angle = settled(block(0.0, G, wind), effort, round((best + 20.0) / pace) + 20)
         title = f"angle of least effort at F_w = {share:g} m g, degrees"
-        findings.append(near(title, found, best, absolute=tolerance))
-    title = "the same from near the far root, degrees"
-    found = settled(block(best + 180.0 - 60.0, G, wind), effort, round(60.0 / pace) + 20)
-    findings.append(near(title, found, best + 180.0, absolute=tolerance))
+        found[title] = Figure(angle, reference=best)
+    angle = settled(block(best + 180.0 - 60.0, G, wind), effort, round(60.0 / pace) + 20)
+    found["the same from near the far root, degrees"] = Figure(angle, reference=best + 180.0)
     size = 0.5 * LENGTH * WEIGHT * FRAME
     world = block(0.0, G, wind)
     least = float(landscape(world, effort, np.array([best]))[0]) / size
-    findings.append(at_most("effort at the optimum over m g L/2 dt", least, 1e-3))
-    angles = np.arange(-180.0, 180.0, 10.0 if quick else 5.0)
+    angles = np.arange(-180.0, 180.0, apart)
     law = np.hypot(1.0, share) * np.abs(np.sin(np.radians(angles - best)))
     wrong = float(np.abs(landscape(world, effort, angles) / size - law).max())
     title = "error of |tau| = (L/2) sqrt((m g)^2 + F_w^2) |sin(psi - psi*)| over m g L/2"
-    return [*findings, at_most(title, wrong, 1e-6)]
+    return {**found, "effort at the optimum over m g L/2 dt": least, title: wrong}
 
 
-def faces_wind(quick: bool) -> list[Finding]:
-    """K2: least effort under gravity and the wind of eq. (2), with windward and leeward faces."""
-    pace = 0.1
-    effort = controller_of(ObjectiveEffort(HINGE), 1.0, pace, "present")
-    findings = []
-    for load, exact in ((0.25, 13.655), (0.5, 24.470), (1.0, 38.173), (2.0, 51.332)):
-        if quick and load != 1.0:
-            continue
-        speed = float(np.sqrt(load * WEIGHT / (2.0 * AIR * LENGTH)))
+def faces_wind(optima: Mapping[str, float]) -> Figures:
+    """K2: least effort under gravity and the wind of eq. (2), with windward and leeward faces.
+
+    optima  load Lam of the wind over the weight -> angle, degrees
+    """
+    effort = controller_of(ObjectiveEffort(HINGE), 1.0, 0.1, "present")
+    found: dict[str, float | Figure] = {}
+    for load, exact in optima.items():
+        speed = float(np.sqrt(float(load) * WEIGHT / (2.0 * AIR * LENGTH)))
         wind = WindFaces((speed, 0.0, 0.0), AIR, ("block",))
         world = block(exact - 5.0, G, wind)
-        title = f"angle of least effort at Lam = {load:g}, degrees"
-        findings.append(near(title, settled(world, effort, 90), exact, absolute=0.2))
+        angle = settled(world, effort, 90)
         model, state = world.setup.solid, world.solid
         pose = kinematics(model, state.q)
         force = wind.wrench(model, pose, np.zeros(model.nv), 0.0)[1, :2] + [0.0, -WEIGHT]
         axis = -pose.body_rotation[1][:2, 1]
         off = np.degrees(np.arctan2(axis[0] * force[1] - axis[1] * force[0], force @ axis))
-        title = f"net force off the block's axis at Lam = {load:g}, degrees"
-        findings.append(at_most(title, float(off), 1.0))
-    return findings
+        title = f"angle of least effort at Lam = {load}, degrees"
+        found[title] = Figure(angle, reference=exact)
+        found[f"net force off the block's axis at Lam = {load}, degrees"] = float(off)
+    return found
 
 
 def wind_towards(degrees: float) -> tuple[Vector, WindFaces]:
@@ -157,43 +154,43 @@ def drag_law(incidence: Array) -> Array:
     return np.abs(np.sin(turn)) ** 3 + thin * np.abs(np.cos(turn)) ** 3
 
 
-def drag_at_rest(quick: bool) -> list[Finding]:
+def drag_at_rest(turns: Sequence[float], apart: float) -> Figures:
     """K3: most and least drag without the relative velocity, for winds from several sides. The
     least drag is at tan phi = w/L, where d/dphi (L sin^3 + w cos^3) = 0: a corner of a thick block
-    points into the wind."""
+    points into the wind. Angles at which the law is compared are some degrees apart."""
     pace = 0.5
     scale = 2.0 * AIR * SPEED**2 * LENGTH
     corner = float(np.degrees(np.arctan(WIDTH / LENGTH)))
-    findings = []
-    for turn in (0.0, 30.0) if quick else (0.0, 30.0, 75.0, -50.0):
+    found: dict[str, float | Figure] = {}
+    for turn in turns:
         along, wind = wind_towards(turn)
         drag = ObjectiveWindDrag(np.array([1]), along)
         for extreme, weight, incidence in (("most", -1.0, 90.0), ("least", 1.0, corner)):
             # incidence 0 is the block along the wind, hinge windward: at angle turn + 90
             goal = turn + 90.0 - incidence
             controller = controller_of(drag, weight, pace, "removed")
-            found = settled(block(goal + 15.0, 0.0, wind), controller, 50)
-            title = f"angle of {extreme} drag, wind turned by {turn:g} degrees"
-            findings.append(near(f"{title}, degrees", found, goal, absolute=1.0))
+            angle = settled(block(goal + 15.0, 0.0, wind), controller, 50)
+            title = f"angle of {extreme} drag, wind turned by {turn:g} degrees, degrees"
+            found[title] = Figure(angle, reference=goal)
     along, wind = wind_towards(0.0)
     controller = controller_of(ObjectiveWindDrag(np.array([1]), along), -1.0, pace, "removed")
     world = block(0.0, 0.0, wind)
     most = -float(landscape(world, controller, np.array([0.0]))[0]) / scale
-    findings.append(near("most drag over 2 rho U^2 L", most, 1.0, relative=1e-6))
-    angles = np.arange(-180.0, 180.0, 10.0 if quick else 5.0)
+    angles = np.arange(-180.0, 180.0, apart)
     wrong = -landscape(world, controller, angles) / scale - drag_law(angles + 90.0)
-    title = "error of D(phi) over 2 rho U^2 L"
-    law = at_most(title, float(np.abs(wrong).max()), 1e-6)
-    return [*findings, law, *drag_of_slender_blocks(quick)]
+    return found | {
+        "most drag over 2 rho U^2 L": most,
+        "error of D(phi) over 2 rho U^2 L": float(np.abs(wrong).max()),
+    }
 
 
-def drag_of_slender_blocks(quick: bool) -> list[Finding]:
+def drag_of_slender_blocks(aspects: Sequence[float]) -> Figures:
     """K3 for blocks of several shapes, with the settings of the scene of least drag. The least drag
     is at a kink with different slopes on its sides: a probe of constant width would find a minimum
     away from it."""
     model = resources.files("flowborne.scenes.library").joinpath("block.xml").read_text()
-    findings = []
-    for aspect in (5.0,) if quick else (4.0, 5.0, 10.0):
+    found = {}
+    for aspect in aspects:
         best = {"most": 0.0, "least": float(np.degrees(np.arctan(aspect)))}
         with TemporaryDirectory() as folder:
             file = Path(folder) / "block.xml"
@@ -205,10 +202,10 @@ def drag_of_slender_blocks(quick: bool) -> list[Finding]:
                     "initial.positions.hinge": f"{angle - 34.3:g}",
                 }
                 with Simulation(load_scene("block-drag-min", settings), workers=1) as simulation:
-                    found = float(hinge_angles(simulation, simulation.frames)[-10:].mean())
+                    final = float(hinge_angles(simulation, simulation.frames)[-10:].mean())
                 title = f"{aspect:g}:1, angle of {goal} drag with the scene's defaults, degrees"
-                findings.append(near(title, found, angle, absolute=0.1))
-    return findings
+                found[title] = Figure(final, reference=angle)
+    return found
 
 
 def hinge_angles(simulation: Simulation, frames: int) -> Array:
@@ -221,25 +218,16 @@ def hinge_angles(simulation: Simulation, frames: int) -> Array:
     return np.degrees([angle(), *frames_of(simulation, frames, angle)])
 
 
-def drag_in_motion(quick: bool) -> list[Finding]:
+def drag_in_motion(frames: int) -> Figures:
     """K4: with velocities kept the block turns against or with the wind at its strength."""
     pace = 20.0 * FRAME
     along, wind = wind_towards(0.0)
     drag = ObjectiveWindDrag(np.array([1]), along)
-    frames = 60 if quick else 160
-    findings = []
+    found = {}
     for kind, where, sign in (("most", "against", -1.0), ("least", "with", 1.0)):
         controller = controller_of(drag, sign, pace, "probe")
         rates = np.diff(path(block(-sign * 70.0, 0.0, wind), controller, frames)) / pace
         for extreme, rate in (("slowest", rates.min()), ("fastest", rates.max())):
             title = f"{kind} drag: {extreme} rate over strength, + is {where} the wind"
-            findings.append(near(title, float(rate * sign), 1.0, relative=0.01))
-    return findings
-
-
-CASES = (
-    Case("K1", uniform_wind),
-    Case("K2", faces_wind),
-    Case("K3", drag_at_rest),
-    Case("K4", drag_in_motion),
-)
+            found[title] = float(rate * sign)
+    return found

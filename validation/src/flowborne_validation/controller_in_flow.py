@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import brentq
 
 from flowborne import Array, Simulation, load_scene
 from flowborne.worlds import advance
-from flowborne_validation.case import Case, Tier, reference
+from flowborne_validation.case import reference
 from flowborne_validation.controller import hinge_angles
-from flowborne_validation.findings import Finding, Grids, above, near
+from flowborne_validation.findings import Figure, Figures
 from flowborne_validation.worlds import hold_all
 
 FRAMES_PER_SECOND = 24.0
@@ -103,31 +104,31 @@ def from_wind(angle: float) -> float:
     return abs((angle % 180.0) - 90.0)
 
 
-def block_in_stream(quick: bool) -> list[Finding]:
-    """K5: final angles by most and least drag, and the drag of held blocks every 5 degrees."""
-    grids = Grids("cells a side", (48,) if quick else (64, 128))
-    findings: list[Finding] = []
-    finals = {}
-    for scene, goal in (("ns-block-drag-max", 90.0), ("ns-block-drag-min", 0.0)):
-        runs = [course(scene, resolution=n) for n in grids.cells]
-        finals[scene] = runs[-1].final
-        values = [from_wind(run.final) for run in runs]
-        title = f"{scene}: final angle to the stream, degrees"
-        findings.append(near(title, values, goal, grids, absolute=15.0))
-    angles = np.arange(-90.0, 91.0, 15.0 if quick else 5.0)
-    resolution, seconds = (32, 3.0) if quick else (64, 6.0)
+def block_in_stream(grids: Sequence[int], apart: float, resolution: int, seconds: float) -> Figures:
+    """K5: final angles by most and least drag, and the drag of blocks held at angles that are some
+    degrees apart."""
+    finals = {
+        scene: [course(scene, resolution=n).final for n in grids]
+        for scene in ("ns-block-drag-max", "ns-block-drag-min")
+    }
+    angles = np.arange(-90.0, 91.0, apart)
     drags = np.array([held_drag(a, resolution, seconds) for a in angles])
     unit = 0.5 * 1000.0  # rho U^2 L / 2 of the NS scenes, N/m
     lines = [f"{a:>6g} degrees: {d / unit:.4g}" for a, d in zip(angles, drags, strict=True)]
     rise = float(drags[len(angles) // 2] - 0.5 * (drags[0] + drags[-1])) / unit
-    title = "drag across the stream less that along it, over rho U^2 L/2"
-    findings.append(above(title, rise, 0.0, "sign", lines))
+    found = {
+        f"{scene}: final angle to the stream, degrees": Figure(
+            [from_wind(angle) for angle in final], grids
+        )
+        for scene, final in finals.items()
+    }
+    found["drag across the stream less that along it, over rho U^2 L/2"] = Figure(rise, lines=lines)
     best = (angles[drags.argmax()], angles[drags.argmin()])
     for (scene, final), angle in zip(finals.items(), best, strict=True):
-        apart = abs((final - angle + 90.0) % 180.0 - 90.0)
+        away = abs((final[-1] - angle + 90.0) % 180.0 - 90.0)
         title = f"{scene}: final angle from that of held blocks, degrees"
-        findings.append(near(title, apart, 0.0, absolute=float(angles[1] - angles[0])))
-    return findings
+        found[title] = Figure(away, judged={"absolute": apart})
+    return found
 
 
 SCENES = {
@@ -163,16 +164,18 @@ OPTIMA = {
 """Degrees: across the wind; the block's corner into it; along the net force."""
 
 
-def frames_and_strength(quick: bool) -> list[Finding]:
-    """K6: frames in simple winds by the rule `fixed` and by the scenes', and those of Fig. 2."""
-    findings = []
-    strengths = (20.0, 40.0) if quick else (5.0, 10.0, 20.0, 40.0)
+def frames_and_strength(strengths: Sequence[float]) -> Figures:
+    """K6: frames in simple winds by the rule `fixed` and by the scenes'."""
+    found: dict[str, float | Figure] = {}
     for scene, optimum in OPTIMA.items():
-        findings += own_rule(scene, optimum, strengths)
+        found.update(own_rule(scene, optimum, strengths))
         best = balanced_corner() if scene == "block-drag-min" else optimum
-        findings += fixed_rule(scene, best, strengths)
-    if quick:
-        return findings
+        found.update(fixed_rule(scene, best, strengths))
+    return found
+
+
+def frames_of_figure_2() -> Figures:
+    """K6: frames in the flow against those in simple winds."""
     paper = reference("K6", "paper frames")
     found = {row: course(scene, rule="fixed").reached for row, scene in SCENES.items()}
     lines = [f"{row}: {found[row]} frames, paper {paper[row]}" for row in SCENES]
@@ -180,10 +183,10 @@ def frames_and_strength(quick: bool) -> list[Finding]:
         found[f"{kind} max drag"] + found[f"{kind} min drag"] for kind in ("NS", "simple")
     )
     title = "frames to reach most and least drag together, NS over simple wind"
-    return [*findings, near(title, flow / simple, 1.0, relative=0.1, lines=lines)]
+    return {title: Figure(flow / simple, lines=lines)}
 
 
-def fixed_rule(scene: str, best: float, strengths: tuple[float, ...]) -> list[Finding]:
+def fixed_rule(scene: str, best: float, strengths: Sequence[float]) -> Figures:
     """Frames and accuracy with which the rule `fixed` arrives at an optimum (degrees)."""
     away = away_from(scene, best)
     runs = [course(scene, frames_enough(away, s), s, rule="fixed") for s in strengths]
@@ -193,24 +196,20 @@ def fixed_rule(scene: str, best: float, strengths: tuple[float, ...]) -> list[Fi
         f"chatter {run.chatter:.2f} steps"
         for s, run, law in zip(strengths, runs, laws, strict=True)
     ]
+    late = max(abs(run.frames - law) for run, law in zip(runs, laws, strict=True))
     products = [run.frames * s for s, run in zip(strengths, runs, strict=True)]
-    figures = {
-        "frames less ceil(|phi0 - phi*| / (strength dt)), largest": max(
-            abs(run.frames - law) for run, law in zip(runs, laws, strict=True)
-        ),
-        "N x strength, largest difference in frames": max(
-            abs(p - products[0]) / max(s, strengths[0])
-            for s, p in zip(strengths, products, strict=True)
-        ),
-        "final angle from the optimum, in steps": max(
-            abs(run.final - best) / run.step for run in runs
-        ),
-        "chatter, in steps": max(run.chatter for run in runs),
-    }
-    first, *others = (
-        near(f"{scene}: {title}", value, 0.0, absolute=1.0) for title, value in figures.items()
+    uneven = max(
+        abs(p - products[0]) / max(s, strengths[0])
+        for s, p in zip(strengths, products, strict=True)
     )
-    return [replace(first, lines=lines), *others]
+    off = max(abs(run.final - best) / run.step for run in runs)
+    title = f"{scene}: frames less ceil(|phi0 - phi*| / (strength dt)), largest"
+    return {
+        title: Figure(late, lines=lines),
+        f"{scene}: N x strength, largest difference in frames": uneven,
+        f"{scene}: final angle from the optimum, in steps": off,
+        f"{scene}: chatter, in steps": max(run.chatter for run in runs),
+    }
 
 
 def away_from(scene: str, angle: float) -> float:
@@ -223,7 +222,7 @@ def frames_enough(away: float, strength: float) -> int:
     return round(1.2 * away * FRAMES_PER_SECOND / strength) + 30
 
 
-def own_rule(scene: str, best: float, strengths: tuple[float, ...]) -> list[Finding]:
+def own_rule(scene: str, best: float, strengths: Sequence[float]) -> Figures:
     """Frames and accuracy with which a scene's own rule arrives at its optimum (degrees)."""
     late, off, chatter = 0.0, 0.0, 0.0
     away = away_from(scene, best)
@@ -234,12 +233,8 @@ def own_rule(scene: str, best: float, strengths: tuple[float, ...]) -> list[Find
         off = max(off, abs(run.final - best))
         chatter = max(chatter, run.chatter)
     own = f"{scene}, own rule"
-    title = f"{own}: frames to a probe's width of the optimum, more than the law's"
-    return [
-        near(title, late, 0.0, absolute=1.0),
-        near(f"{own}: final angle from the optimum, degrees", off, 0.0, absolute=0.1),
-        near(f"{own}: chatter, in steps", chatter, 0.0, absolute=0.1),
-    ]
-
-
-CASES = (Case("K5", block_in_stream, Tier.HALF_HOUR, coarse=True), Case("K6", frames_and_strength))
+    return {
+        f"{own}: frames to a probe's width of the optimum, more than the law's": late,
+        f"{own}: final angle from the optimum, degrees": off,
+        f"{own}: chatter, in steps": chatter,
+    }

@@ -80,7 +80,7 @@ def convergence_figure(out: Path, console: Console) -> None:
 
 def swimmer_figure(out: Path, console: Console) -> None:
     """Fig. 7: rise, tilt and work of the swimmer, with its jet alone, and with neither."""
-    found = swims(quick=False)
+    found = swims(3)
     columns = ("run", "rises m", "largest tilt degrees", "work of the drives kJ")
     rows = [
         (name, f"{run.risen():.2f}", f"{run.tilt.max():.1f}", f"{1e-3 * run.work[-1]:.1f}")
@@ -125,7 +125,7 @@ def chain_figure(out: Path, console: Console) -> None:
 
 def flyer_figure(out: Path, console: Console) -> None:
     """Figs. 11 and 12: upward force on a flyer with and without twisting wings."""
-    found = flights(quick=False)
+    found = flights(5)
     strokes = np.hstack([found["twist"].impulses(), found["base"].impulses()])
     rows = [(n, *(f"{value:.1f}" for value in row)) for n, row in enumerate(strokes, 1)]
     columns = ("stroke", "down N s", "up N s", "down without N s", "up without N s")

@@ -1,10 +1,11 @@
-"""Findings of validation cases: quantities on one or several grids, measured and judged."""
+"""What cases measure, figures on one or several grids and curves, and how it is judged."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Any, Literal, NamedTuple, TypedDict, Unpack
+import operator
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal
 
 import numpy as np
 
@@ -16,21 +17,12 @@ Verdict = Literal["pass", "coarse", "fail", "unconfirmed"]
 case is judged on its finest grids. A figure inside its tolerance passes on any grid."""
 
 
-Figures = Sequence[float] | Sequence[Sequence[float]] | Array
-"""A figure on each of several grids, or in several places of a body in the cell on each."""
-
-
-class Grids(NamedTuple):
-    """Resolutions from coarse to fine, with their unit, such as "cells across D"."""
-
-    label: str
-    cells: Sequence[Any]
-
-
 @dataclass(frozen=True)
 class GridSeries:
-    """A figure and its error from grid to grid; label and cells as in `Grids`.
+    """A figure and its error from grid to grid, from coarse to fine.
 
+    label   unit of the grids, such as "cells across D"
+    cells   the grids in it
     values  the figure on each grid
     errors  its error on each, not negative
     places  the figure in each place of a body in the cell, on each grid, if it has several places
@@ -44,7 +36,12 @@ class GridSeries:
 
     @classmethod
     def toward(
-        cls, grids: Grids, values: Figures, exact: float, relative: bool = False
+        cls,
+        label: str,
+        cells: Sequence[float],
+        values: Sequence[Any] | Array,
+        exact: float,
+        relative: bool = False,
     ) -> GridSeries:
         """A series with the errors |value - exact|, or, if `relative`, |value / exact - 1|.
 
@@ -53,7 +50,7 @@ class GridSeries:
         means = [float(np.mean(value)) for value in values]
         errors = [abs(value / exact - 1.0 if relative else value - exact) for value in means]
         places = [list(np.atleast_1d(value)) for value in values] if np.ndim(values[0]) else ()
-        return cls(*grids, means, errors, places)
+        return cls(label, cells, means, errors, places)
 
     @property
     def order(self) -> float:
@@ -139,132 +136,134 @@ class Plot:
 
 
 @dataclass(frozen=True)
-class Finding:
-    """One quantity of a case, measured and judged.
+class Figure:
+    """A measured quantity.
 
-    tolerance  accepted distance from the reference, in words or as a number
+    values     a number; or one on each of several grids, of which the last counts; or several on
+               each, in different places of a body in the cell, whose mean counts
+    cells      the grids, from coarse to fine
+    reference  what it should be, if neither the table of cases nor the list of references has it
+    value      the number that counts, if it is not the last one
     lines      details for people
     plot       the curve of which the quantity is a figure, and the published one
-    confirmed  False if the list has the reference from memory: the finding does not count
+    judged     fields of its `Rule` that depend on the run
+    on         unit of the grids
     """
 
-    quantity: str
-    value: Value
-    reference: Value
-    tolerance: Value
-    passed: bool
-    series: GridSeries | None = None
+    values: Any
+    cells: Sequence[float] = ()
+    reference: float | None = None
+    value: float | None = None
     lines: Sequence[str] = ()
     plot: Plot | None = None
-    confirmed: bool = True
-
-    def verdict(self, coarse: bool = False) -> Verdict:
-        """The verdict in a run; `coarse` says that the run's grids are too coarse for the case.
-        Only a figure with a grid series can be coarse; all others hold on any grid."""
-        if not self.confirmed:
-            return "unconfirmed"
-        if self.passed:
-            return "pass"
-        return "coarse" if coarse and self.series is not None else "fail"
+    judged: Mapping[str, Any] = field(default_factory=dict)
+    on: str = ""
 
 
-class Details(TypedDict, total=False):
-    """Values of a `Finding` besides or in place of those that a function gives it."""
-
-    tolerance: Value
-    series: GridSeries | None
-    lines: Sequence[str]
-    plot: Plot | None
-    confirmed: bool
+Figures = Mapping[str, float | Figure]
+"""Quantity -> what was measured."""
 
 
-Measured = float | Figures | GridSeries
-"""A number; figures on several grids, of which the last counts; or a series of them."""
+def figure_of(found: float | Figure) -> Figure:
+    """The figure, or the figure of a number."""
+    return found if isinstance(found, Figure) else Figure(found)
 
 
-def near(
-    quantity: str,
-    value: Measured,
-    reference: float,
-    on: Grids | None = None,
-    *,
-    relative: float | None = None,
-    absolute: float | None = None,
-    **details: Unpack[Details],
-) -> Finding:
-    """A finding that passes within a relative or an absolute tolerance of its reference.
+def over(grids: Sequence[Any], measure: Callable[[Any], Figures]) -> dict[str, Figure]:
+    """Figures of one grid after the other; all but the values is that of the last one.
 
-    on  the grids of several figures
+    grids  a number, or cells along several axes, of which the first names the grid
     """
-    figure, series = _figure(value, reference, on)
-    bound = relative * abs(reference) if relative is not None else absolute
-    assert bound is not None
-    passed = bool(abs(figure - reference) <= bound)
-    tolerance = f"{100.0 * relative:g} %" if relative is not None else f"{bound:g}"
-    return replace(Finding(quantity, figure, reference, tolerance, passed, series), **details)
+    runs = [{name: figure_of(f) for name, f in measure(grid).items()} for grid in grids]
+    cells = [grid[0] if isinstance(grid, Sequence) else grid for grid in grids]
+    return {
+        name: replace(last, values=[run[name].values for run in runs], cells=cells)
+        for name, last in runs[-1].items()
+    }
 
 
-def within(
-    quantity: str,
-    values: Figures,
-    reference: float,
-    interval: tuple[float, float],
-    on: Grids,
-    **details: Unpack[Details],
-) -> Finding:
-    """A finding on several grids whose last value has to lie in an interval."""
-    value, series = _figure(values, reference, on)
-    low, high = interval
-    found = Finding(
-        quantity, value, reference, f"[{low:g}, {high:g}]", low <= value <= high, series
-    )
-    return replace(found, **details)
+def named(
+    names: Sequence[str], values: Sequence[Any], cells: Sequence[float], lines: Sequence[str] = ()
+) -> dict[str, Figure]:
+    """Figures of several quantities on the same grids; the lines are those of the first."""
+    found = {name: Figure(v, cells) for name, v in zip(names, values, strict=True)}
+    return found | {names[0]: replace(found[names[0]], lines=lines)}
 
 
-def falling(found: Finding) -> Finding:
-    """The finding, which passes only if its errors fall from grid to grid, too."""
-    assert found.series is not None
-    tolerance = f"{found.tolerance}, falling from grid to grid"
-    return replace(found, tolerance=tolerance, passed=found.passed and found.series.falls)
+COMPARE = {">": operator.gt, ">=": operator.ge, "<": operator.lt, "<=": operator.le}
 
 
-def at_most(
-    quantity: str,
-    value: Measured,
-    bound: float,
-    on: Grids | None = None,
-    **details: Unpack[Details],
-) -> Finding:
-    """A finding whose reference is 0 and whose size may be at most `bound`."""
-    return near(quantity, value, 0.0, on, absolute=bound, **details)
+@dataclass(frozen=True)
+class Rule:
+    """How quantities are judged: a row of the table of cases.
 
+    reference        a number, or a bound such as "> 0". By default that of the figure, or the
+                     number in the list of references; if there is none, 0, or 1 for a relative
+                     tolerance
+    known            name of that number in the list, if it is not the quantity
+    relative         accepted distance from the reference over its size
+    absolute         accepted distance from the reference
+    within           least and largest accepted value
+    no_more          whether the value may be as large as the reference and no larger
+    order            expected order of convergence, which is judged in place of the figure
+    falling          whether errors have to fall from grid to grid, too
+    relative_errors  whether the errors of the series are relative
+    tolerance        in words, in place of those that the numbers give
+    """
 
-def above(
-    quantity: str, value: float, bound: float, tolerance: str, lines: Sequence[str] = ()
-) -> Finding:
-    """A finding that passes above a bound; `tolerance` says what that means, such as "sign"."""
-    passed = bool(value > bound)
-    return Finding(quantity, value, f"> {bound:g}", tolerance, passed, lines=lines)
+    reference: Value | None = None
+    known: str | None = None
+    relative: float | None = None
+    absolute: float = np.inf
+    within: tuple[float, float] | None = None
+    no_more: bool = False
+    order: float | None = None
+    falling: bool = False
+    relative_errors: bool = False
+    tolerance: str | None = None
 
+    def reference_of(self, quantity: str, figure: Figure, listed: Mapping[str, Any]) -> Value:
+        """The reference of a figure; `listed` are the quantities in the list of references."""
+        if figure.reference is not None:
+            return figure.reference
+        if self.reference is not None:
+            return self.reference
+        found: Value = listed.get(self.known or quantity, 1.0 if self.relative else 0.0)
+        return found
 
-def _figure(value: Measured, exact: float, on: Grids | None) -> tuple[float, GridSeries | None]:
-    """The figure that counts, and its series."""
-    if on is not None:
-        assert isinstance(value, Sequence | np.ndarray)
-        value = GridSeries.toward(on, value, exact)
-    if isinstance(value, GridSeries):
-        return float(value.values[-1]), value
-    assert not isinstance(value, Sequence | np.ndarray)
-    return float(value), None
+    def value_of(self, figure: Figure, exact: Value) -> tuple[float, GridSeries | None]:
+        """The number of a figure that is judged, and its grid series."""
+        if not figure.cells:
+            return float(figure.values), None
+        aim = 0.0 if self.no_more or isinstance(exact, str) else exact
+        shown = figure.on, figure.cells, figure.values
+        series = GridSeries.toward(*shown, aim, self.relative_errors)
+        last = series.values[-1] if figure.value is None else figure.value
+        return last if self.order is None else series.order, series
 
+    def accepts(self, value: float, exact: Value, series: GridSeries | None) -> bool:
+        """Whether a value is near enough to its reference."""
+        if self.falling and series is not None and not series.falls:
+            return False
+        if self.within is not None:
+            return bool(self.within[0] <= value <= self.within[1])
+        if isinstance(exact, str):
+            sign, bound = exact.split()
+            return bool(COMPARE[sign](value, float(bound)))
+        if self.no_more:
+            return bool(abs(value) <= exact)
+        largest = self.absolute if self.relative is None else self.relative * abs(exact)
+        return bool(abs(value - exact) <= largest)
 
-def order_of(
-    quantity: str, series: GridSeries, *, least: float | None = None, expected: float | None = None
-) -> Finding:
-    """A finding about an order of convergence: at least `least`, or `expected` to 0.2."""
-    order = series.order
-    if least is not None:
-        return Finding(quantity, order, 2.0, f">= {least:g}", bool(order >= least), series)
-    assert expected is not None
-    passed = bool(abs(order - expected) <= 0.2 and series.falls)
-    return Finding(quantity, order, expected, "0.2", passed, series)
+    @property
+    def accepted(self) -> str:
+        """What is accepted, in words."""
+        if self.tolerance is not None:
+            return self.tolerance
+        if self.within is not None:
+            words = "[{:g}, {:g}]".format(*self.within)
+        elif self.relative is not None:
+            words = f"{100.0 * self.relative:g} %"
+        else:
+            words = f"{self.absolute:g}"
+        return f"{words}, falling from grid to grid" if self.falling else words

@@ -11,19 +11,16 @@ head's first harmonic, as published.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from time import perf_counter
 
 import numpy as np
 
 from flowborne import Array, Simulation, load_scene
-from flowborne_validation.case import Case, reference
-from flowborne_validation.findings import Finding, Grids, at_most, near
+from flowborne_validation.case import reference
+from flowborne_validation.findings import Figure, Figures
 from flowborne_validation.measurements import rows_of
 from flowborne_validation.worlds import frames_of
-
-RUNS = ("0.50", "1.00", "1.50", "2.00")
-"""Names of the runs: Hz of the motor as it was set."""
 
 FRAMES, SKIPPED, COUNTED = 40, 6, 3
 """Frames per beat, beats from the start that are left out, and those that are measured after."""
@@ -175,41 +172,38 @@ IMMERSED: Mapping[str, Mapping[str, str]] = {
 """The same on the finer grid, whose cells do not close the gaps between the arms."""
 
 
-def compared(runs: Sequence[str], cells: Sequence[int], bar: Sequence[str] = ()) -> list[Finding]:
-    """QUANTITIES of some runs on some grids, of which the last is judged by the measured errors.
+def compared(runs: Sequence[str], grids: Sequence[int], bar: bool = False) -> Figures:
+    """R2: QUANTITIES of runs on some grids, of which the last is judged by the measured errors.
 
-    bar  lines on the error bar of the speed
+    bar  whether to measure the error bar of the speed
     """
-    grids = Grids("cells along the window", cells)
-    findings, errors = [], []
+    found: dict[str, Figure] = {}
+    errors, changes = [], error_bar(grids) if bar else []
     for run in runs:
         real = measured(run)
-        swims = [swim(run, n) for n in cells]
+        swims = [swim(run, n) for n in grids]
         figures = np.array([one.figures() for one in swims])
         lines = [
             f"{n:>6} cells along the window: {one.seconds:.2f} s per frame, in each beat "
             + ", ".join(f"{speed:.4f}" for speed in one.by_beat())
-            for n, one in zip(cells, swims, strict=True)
+            for n, one in zip(grids, swims, strict=True)
         ]
+        # the way does not depend on the time base of the video
+        ways = (speed / real["beat_hz"] for speed in (figures[-1, 0], real["speed"]))
+        lines += ["way in a beat {:.4f} m, measured {:.4f} m".format(*ways), *changes]
         errors.append(np.abs(figures[:, 0] - real["speed"]))
         for k, (quantity, (value, error)) in enumerate(zip(QUANTITIES, COLUMNS, strict=True)):
-            title = f"run {run}, beat {real['beat_hz']:.3f} Hz: {quantity}"
-            more = [*lines, per_beat(figures[-1, 0], real), *bar] if k == 0 else []
-            findings.append(
-                near(title, figures[:, k], real[value], grids, absolute=real[error], lines=more)
+            found[f"run {run}, beat {real['beat_hz']:.3f} Hz: {quantity}"] = Figure(
+                figures[:, k],
+                grids,
+                real[value],
+                lines=lines if k == 0 else (),
+                judged={"absolute": real[error]},
             )
     twin, slender = (reference("R2", name) for name in ("authors' twin", "elongated-body theory"))
-    title = f"mean error of speed over {len(runs)} runs, m/s"
     others = f"the authors' fitted twin {twin:g} and elongated-body theory {slender:g}, over 8 runs"
-    mean = np.mean(errors, axis=0)
-    found = at_most(title, mean, twin, grids, tolerance="at most", lines=[others])
-    return [*findings, replace(found, reference=twin)]
-
-
-def per_beat(speed: float, real: Mapping[str, float]) -> str:
-    """The way in a beat, which does not depend on the time base of the video, in words."""
-    ways = (v / real["beat_hz"] for v in (speed, real["speed"]))
-    return "way in a beat {:.4f} m, measured {:.4f} m".format(*ways)
+    mean = Figure(np.mean(errors, axis=0), grids, twin, lines=[others])
+    return {**found, f"mean error of speed over {len(runs)} runs, m/s": mean}
 
 
 def error_bar(cells: Sequence[int]) -> list[str]:
@@ -225,13 +219,3 @@ def error_bar(cells: Sequence[int]) -> list[str]:
     whole = float(np.linalg.norm(list(changes.values())))
     listed = [f"{name}: {change:+.4f} m/s" for name, change in changes.items()]
     return [*listed, f"error bar at 1 Hz, root of the sum of squares: {whole:.4f} m/s"]
-
-
-def robot(quick: bool) -> list[Finding]:
-    """R2: speed, sway and yaw within the errors of what was measured."""
-    if quick:
-        return compared(("1.00",), (45,))
-    return compared(RUNS, (60, 90), error_bar((60, 90)))
-
-
-CASES = (Case("R2", robot, coarse=True),)

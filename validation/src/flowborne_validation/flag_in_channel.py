@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -11,8 +11,8 @@ import numpy as np
 from flowborne import Array, Fluid, Grid, Setup, SolidModel, StepReport, World
 from flowborne.bodies import FleshMesh, FleshTable
 from flowborne.worlds import Boundaries, BoundaryInflow, BoundaryNoSlip, BoundaryOpen
-from flowborne_validation.case import Case, Tier, reference
-from flowborne_validation.findings import Finding, Grids, near, within
+from flowborne_validation.case import reference
+from flowborne_validation.findings import Figure, Figures
 from flowborne_validation.flesh import round_root
 from flowborne_validation.flesh_bars import flat_mesh, grown_from, tissue_table
 from flowborne_validation.shedding import Oscillation, amplitude, crest
@@ -35,12 +35,10 @@ CELLS, CFL = (35, 2), 1.0
 """Cells of flesh along and across the flag, with which D1 is 0.5 % off; cells that the fastest
 inflow crosses in a step."""
 
-GRIDS = {True: (44,), False: (44, 85, 126)}
-FLUTTERING = (44, 85)
 BEHIND = 0.1
-"""Cells across the channel, by quick, and for FSI2 and FSI3; cells between A and the plane of the
-grid before it. With 44 cells and steps of 41 the sides of the flag at rest lie 0.39 and 0.54 of a
-cell above planes. On others, and with its end in other places, it has another lift: D6."""
+"""Cells between A and the plane of the grid before it. With 44 cells across the channel and steps
+of 41 the sides of the flag at rest lie 0.39 and 0.54 of a cell above planes. On others, and with
+its end in other places, it has another lift: D6."""
 
 
 @dataclass(frozen=True)
@@ -154,7 +152,7 @@ means and the remaining changes."""
 
 
 def steady(flow: Flow, grids: Sequence[int], quick: bool) -> tuple[Array, list[str]]:
-    """(grids, 4) drag, lift and displacement of A in a steady flow, and their changes as text."""
+    """(4, grids) drag, lift and displacement of A in a steady flow, and their changes as text."""
     found, lines = [], []
     for n, world, first in refined(grids, partial(channel, flow=flow), Parabola(flow.peak)):
         rows = march(world, flow, flow.longest * (1.0 if first and not quick else SHORTER))
@@ -163,31 +161,7 @@ def steady(flow: Flow, grids: Sequence[int], quick: bool) -> tuple[Array, list[s
         drag, lift, *_ = np.ptp(last, axis=0)
         title = f"drag still changes by {drag:.2g}, lift by {lift:.2g}"
         lines.append(f"{n:>6g} cells across the channel: {title}")
-    return np.array(found), lines
-
-
-def judged(
-    flow: Flow,
-    quantity: str,
-    grids: Sequence[int],
-    values: Array,
-    relative: float,
-    lines: Sequence[str] = (),
-) -> Finding:
-    """A figure within a relative tolerance of the published one."""
-    exact, on = reference(flow.case, flow.name)[quantity], Grids("cells across the channel", grids)
-    return near(f"{flow.name}, {quantity}", values, exact, on, relative=relative, lines=lines)
-
-
-def between(
-    flow: Flow, quantity: str, grids: Sequence[int], values: Array, lines: Sequence[str] = ()
-) -> Finding:
-    """A figure within the range of published ones."""
-    exact, low, high = reference(flow.case, flow.name)[quantity]
-    on = Grids("cells across the channel", grids)
-    accepted = f"{low:g} to {high:g}"
-    title = f"{flow.name}, {quantity}"
-    return within(title, values, exact, (low, high), on, lines=lines, tolerance=accepted)
+    return np.array(found).T, lines
 
 
 PERIODS = 4
@@ -230,65 +204,62 @@ def flutter(rows: Array, dt: float) -> Flutter:
     return Flutter(np.array(middle), np.array(swing), 1.0 / period, line)
 
 
-def periodic(flow: Flow, grids: Sequence[int]) -> list[Flutter]:
-    """A flow that flutters, grid after grid."""
-    found = []
+def periodic(flow: Flow, grids: Sequence[int]) -> tuple[Array, Array, Array, list[str]]:
+    """A flow that flutters, grid after grid: means (4, grids), amplitudes (4, grids), frequencies
+    (grids,), and deviations from a periodic motion as text."""
+    seen, lines = [], []
     for n, world, first in refined(grids, partial(channel, flow=flow), Parabola(flow.peak)):
         rows = march(world, flow, flow.longest * (1.0 if first else SHORTER))
-        seen = flutter(rows, time_step(world, flow))
-        found.append(replace(seen, line=f"{n:>6g} cells across the channel: {seen.line}"))
+        seen.append(flutter(rows, time_step(world, flow)))
+        lines.append(f"{n:>6g} cells across the channel: {seen[-1].line}")
+    means, swings = np.array([s.means for s in seen]).T, np.array([s.amplitudes for s in seen]).T
+    return means, swings, np.array([s.frequency for s in seen]), lines
+
+
+def rigid_flag(grids: Sequence[int], quick: bool) -> Figures:
+    """D2: drag and lift of the rigid flag in a steady flow."""
+    found: dict[str, Figure] = {}
+    for flow in CFD[:2]:
+        values, lines = steady(flow, grids, quick)
+        exact = reference("D2", flow.name)
+        found[f"{flow.name}, drag"] = Figure(values[0], grids, exact["drag"], lines=lines)
+        found[f"{flow.name}, lift"] = Figure(values[1], grids, exact["lift"])
     return found
 
 
-def rigid_flag(quick: bool) -> list[Finding]:
-    """D2: drag and lift of the rigid flag, unless quick also with the vortices of CFD3."""
-    grids, findings = GRIDS[quick], []
-    for flow in CFD[:2]:
-        values, lines = steady(flow, grids, quick)
-        findings.append(judged(flow, "drag", grids, values[:, 0], 0.02, lines))
-        findings.append(judged(flow, "lift", grids, values[:, 1], 0.02))
-    if quick:
-        return findings
-    seen = periodic(CFD[2], grids)
-    means, swings, frequencies = figures_of(seen)
-    lines = [s.line for s in seen]
-    for axis, name in enumerate(("drag", "lift")):
-        findings.append(judged(CFD[2], f"{name} mean", grids, means[:, axis], 0.02, lines))
-        findings.append(judged(CFD[2], f"{name} amplitude", grids, swings[:, axis], 0.05))
-    return [*findings, judged(CFD[2], "frequency", grids, frequencies, 0.01)]
+def rigid_flag_in_vortices(grids: Sequence[int]) -> Figures:
+    """D2: the same with the vortices of CFD3."""
+    means, swings, frequencies, lines = periodic(CFD[2], grids)
+    exact, found = reference("D2", "CFD3"), {}
+    for name, mean, swing in zip(("drag", "lift"), means[:2], swings[:2], strict=True):
+        found[f"CFD3, {name} mean"] = Figure(mean, grids, exact[f"{name} mean"], lines=lines)
+        found[f"CFD3, {name} amplitude"] = Figure(swing, grids, exact[f"{name} amplitude"])
+    return found | {"CFD3, frequency": Figure(frequencies, grids, exact["frequency"])}
 
 
-def flag_of_flesh(quick: bool) -> list[Finding]:
-    """D3: FSI1, which comes to rest, and unless quick FSI2 and FSI3, which flutter."""
-    grids, findings = GRIDS[quick], []
+def flag_of_flesh(grids: Sequence[int], quick: bool) -> Figures:
+    """D3: FSI1, which comes to rest."""
     values, lines = steady(FSI[0], grids, quick)
+    found = {}
     for axis, name in ((2, "ux"), (3, "uy"), (0, "drag"), (1, "lift")):
-        findings.append(between(FSI[0], name, grids, values[:, axis], lines if axis == 2 else ()))
-    grids = FLUTTERING
-    for flow in () if quick else FSI[1:]:
-        seen = periodic(flow, grids)
-        means, swings, frequencies = figures_of(seen)
-        for axis, name in enumerate(("drag", "lift", "ux", "uy")):
-            exact = reference("D3", flow.name)[f"{name} mean"]
-            found = ", ".join(f"{v:.4g}" for v in means[:, axis])
-            lines = [f"mean {found} from grid to grid, published {exact:g}"]
-            lines += [s.line for s in seen]
+        exact, low, high = reference("D3", "FSI1")[name]
+        judged = {"within": (low, high), "tolerance": f"{low:g} to {high:g}"}
+        shown = lines if axis == 2 else ()
+        figure = Figure(values[axis], grids, exact, lines=shown, judged=judged)
+        found[f"FSI1, {name}"] = figure
+    return found
+
+
+def fluttering_flags(grids: Sequence[int]) -> Figures:
+    """D3: FSI2 and FSI3."""
+    found = {}
+    for flow in FSI[1:]:
+        means, swings, frequencies, lines = periodic(flow, grids)
+        exact = reference("D3", flow.name)
+        for name, mean, swing in zip(("drag", "lift", "ux", "uy"), means, swings, strict=True):
+            listed, published = ", ".join(f"{v:.4g}" for v in mean), exact[f"{name} mean"]
+            shown = [f"mean {listed} from grid to grid, published {published:g}", *lines]
             title = f"{name} amplitude"
-            findings.append(judged(flow, title, grids, swings[:, axis], 0.05, lines))
-        findings.append(judged(flow, "frequency", grids, frequencies, 0.03))
-    return findings
-
-
-def figures_of(seen: Sequence[Flutter]) -> tuple[Array, Array, Array]:
-    """Means (grids, 4), amplitudes (grids, 4) and frequencies (grids,)."""
-    return (
-        np.array([s.means for s in seen]),
-        np.array([s.amplitudes for s in seen]),
-        np.array([s.frequency for s in seen]),
-    )
-
-
-CASES = (
-    Case("D2", rigid_flag, Tier.HALF_HOUR, coarse=True),
-    Case("D3", flag_of_flesh, Tier.HALF_HOUR, coarse=True),
-)
+            found[f"{flow.name}, {title}"] = Figure(swing, grids, exact[title], lines=shown)
+        found[f"{flow.name}, frequency"] = Figure(frequencies, grids, exact["frequency"])
+    return found

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -114,7 +114,7 @@ class Bar:
 
 
 def bar_of(
-    cells: tuple[int, ...],
+    cells: Sequence[int],
     size: tuple[float, float],
     tissue: FleshTable,
     gravity: Vector,

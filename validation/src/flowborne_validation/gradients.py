@@ -19,9 +19,8 @@ from flowborne.parts import (
     ObjectiveWindDrag,
 )
 from flowborne.worlds import make_world
-from flowborne_validation.case import Case, Tier
 from flowborne_validation.controller import AIR, HINGE, LENGTH, SPEED, WIDTH, block
-from flowborne_validation.findings import Finding, Grids, GridSeries, at_most, near, order_of
+from flowborne_validation.findings import Figure, Figures
 from flowborne_validation.worlds import Vector, mjcf, square
 
 FRAME = 1.0 / 24.0
@@ -38,48 +37,41 @@ def drag_slope(degrees: float) -> float:
     return float(2.0 * AIR * SPEED**2 * rise)
 
 
-def slopes(
-    gradient: type[GradientCentral] | type[GradientOneSided], sizes: list[float], degrees: float
-) -> list[float]:
-    """Estimates with displacements `sizes` (degrees), N per rad."""
-    drag = ObjectiveSum.of(ObjectiveWindDrag(np.array([1]), (1.0, 0.0, 0.0)))
-    found = []
-    for size in sizes:
-        controller = Controller(
-            HINGE,
-            drag,
-            Hypothesis(FRAME),
-            1.0,
-            gradient(float(np.radians(size))),
-            executor=Serial(),
-        )
-        world = block(degrees, 0.0, WindFaces((SPEED, 0.0, 0.0), AIR, ("block",)))
-        estimate = controller.gradient.estimate(controller.trials(world, step))
-        found.append(float(estimate.gradient[0]))
-    return found
+def slope(
+    gradient: type[GradientCentral] | type[GradientOneSided], size: float, degrees: float
+) -> float:
+    """Estimate with a displacement `size` (degrees), N per rad."""
+    controller = Controller(
+        HINGE,
+        ObjectiveSum.of(ObjectiveWindDrag(np.array([1]), (1.0, 0.0, 0.0))),
+        Hypothesis(FRAME),
+        1.0,
+        gradient(float(np.radians(size))),
+        executor=Serial(),
+    )
+    world = block(degrees, 0.0, WindFaces((SPEED, 0.0, 0.0), AIR, ("block",)))
+    return float(controller.gradient.estimate(controller.trials(world, step)).gradient[0])
 
 
-def difference_error(quick: bool) -> list[Finding]:
-    """Order of both differences, and the bias of the one-sided at an optimum."""
-    sizes = [4.0, 2.0, 1.0, 0.5] if quick else [4.0, 2.0, 1.0, 0.5, 0.25]
+def difference_error(inverse: float) -> Figures:
+    """K7: both differences with a displacement, 1/degrees."""
     exact = drag_slope(LEANING)
-    findings = []
-    for label, kind, order in (
-        ("central", GradientCentral, 2.0),
-        ("one-sided", GradientOneSided, 1.0),
-    ):
-        found = slopes(kind, sizes, LEANING)
-        inverse = Grids("h^-1 in 1/degree", [1.0 / size for size in sizes])
-        series = GridSeries.toward(inverse, found, exact, relative=True)
-        findings.append(order_of(f"order of {label} differences", series, expected=order))
+    return {
+        f"order of {label} differences": Figure(
+            slope(kind, 1.0 / inverse, LEANING), reference=exact
+        )
+        for label, kind in (("central", GradientCentral), ("one-sided", GradientOneSided))
+    }
+
+
+def bias_at_optimum() -> Figures:
+    """K7: both differences at an optimum, where the one-sided one is biased."""
     scale = 2.0 * AIR * SPEED**2 * LENGTH
-    level = slopes(GradientCentral, [5.0], 0.0)[0] / scale
-    biased = slopes(GradientOneSided, [5.0], 0.0)[0] / scale
-    return [
-        *findings,
-        at_most("central gradient at the most drag over 2 rho U^2 L", level, 1e-10),
-        Finding("one-sided gradient there", biased, "< 0", "biased by O(h)", biased < -1e-3),
-    ]
+    return {
+        "central gradient at the most drag over 2 rho U^2 L": slope(GradientCentral, 5.0, 0.0)
+        / scale,
+        "one-sided gradient there": slope(GradientOneSided, 5.0, 0.0) / scale,
+    }
 
 
 def pushed_arm(force: Vector) -> World:
@@ -102,11 +94,12 @@ def pushed_arm(force: Vector) -> World:
     )
 
 
-def exact_position(quick: bool) -> list[Finding]:
-    """Displacement of the trials less the requested one, and joints less targets after a frame."""
+def exact_position(count: int) -> Figures:
+    """K7: displacement of the trials less the requested one, and joints less targets after a frame,
+    in some states."""
     rng = np.random.default_rng(3)
     wrong, off = 0.0, 0.0
-    for _ in range(2 if quick else 10):
+    for _ in range(count):
         fx, fy = rng.uniform(-50.0, 50.0, 2)
         world = pushed_arm((float(fx), float(fy), 0.0))
         world.solid.q[:] = rng.uniform(-1.0, 1.0, 2)
@@ -132,10 +125,10 @@ def exact_position(quick: bool) -> list[Finding]:
             command = controller.command(world, FRAME, FRAME / 3.0)
             step(world, FRAME / 3.0, command)
         off = max(off, float(np.abs(world.solid.q - target).max()))
-    return [
-        at_most("displacement of a trial minus the one asked for, rad", wrong, 1e-6),
-        at_most("joints minus their targets at the end of a frame, rad", off, 1e-6),
-    ]
+    return {
+        "displacement of a trial minus the one asked for, rad": wrong,
+        "joints minus their targets at the end of a frame, rad": off,
+    }
 
 
 CHAINS = (1, 2, 3, 4)
@@ -165,31 +158,18 @@ def decision_seconds(
     return [float(np.median(times)) for times in spent]
 
 
-def chain_cost(quick: bool) -> list[Finding]:
-    """Time of a decision against the number of joints. The serial time is CPU time, so that it does
-    not depend on other load of the machine."""
-    count, resolution = (3, 48) if quick else (15, 128)
+def chain_cost(count: int, resolution: int) -> Figures:
+    """K7: time of a decision against the number of joints. The serial time is CPU time, so that it
+    does not depend on other load of the machine."""
     serial = decision_seconds(count, resolution, 1, process_time)
     side = decision_seconds(count, resolution, cores(), perf_counter)
     lines = [
         f"{n} joints: {s:.4g} s serial, {p:.4g} s with {cores()} workers"
         for n, s, p in zip(CHAINS, serial, side, strict=True)
     ]
-    return [
-        near(
-            f"serial time of a decision for {n} joints over that for one",
-            seconds / serial[0],
-            float(n),
-            relative=0.1,
-            lines=lines if n == CHAINS[-1] else (),
+    return {
+        f"serial time of a decision for {n} joints over that for one": Figure(
+            seconds / serial[0], (), float(n), lines=lines if n == CHAINS[-1] else ()
         )
         for n, seconds in zip(CHAINS[1:], serial[1:], strict=True)
-    ]
-
-
-def gradient_case(quick: bool) -> list[Finding]:
-    """K7."""
-    return difference_error(quick) + exact_position(quick) + chain_cost(quick)
-
-
-CASES = (Case("K7", gradient_case, Tier.HALF_HOUR, alone=True),)
+    }

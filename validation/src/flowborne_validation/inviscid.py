@@ -18,8 +18,8 @@ from flowborne.worlds import (
     set_velocity,
 )
 from flowborne_validation.articulated import first_angle, passages
-from flowborne_validation.case import Case, Tier, reference, table
-from flowborne_validation.findings import Finding, Grids, GridSeries, at_most, falling, near
+from flowborne_validation.case import reference, table
+from flowborne_validation.findings import Figure, Figures, GridSeries
 from flowborne_validation.worlds import (
     PERIODIC,
     RING,
@@ -82,28 +82,21 @@ def neutral(
     return float(np.abs(moved).max()), float(np.abs(world.solid.v - first).max())
 
 
-def neutrally_buoyant(quick: bool) -> list[Finding]:
+def neutrally_buoyant(steps: int, dimensions: Sequence[int]) -> Figures:
     """I4: bodies of many shapes stay at rest, or move with the stream."""
-    steps = 100 if quick else 1000
-    flat = square(32, 2.0)
-    solid = Grid((16, 16, 16), 2.0 / 16, (-1.0, -1.0, -1.0))
-    findings = []
-    for label, grid, bodies in (("2D", flat, FLAT_BODIES), ("3D", solid, SOLID_BODIES)):
-        if quick and grid is solid:
-            continue
+    flat, solid = square(32, 2.0), Grid((16, 16, 16), 2.0 / 16, (-1.0, -1.0, -1.0))
+    found = {}
+    for count in dimensions:
+        grid, bodies = (flat, FLAT_BODIES) if count == 2 else (solid, SOLID_BODIES)
         moved, fast = neutral(grid, bodies, 0.02, steps)
-        findings += [
-            at_most(f"displacement over {steps} steps at rest, {label}, m", moved, 1e-8),
-            at_most(f"velocity after {steps} steps at rest, {label}, m/s", fast, 1e-8),
-        ]
-    stream = (0.4, 0.23, 0.0)
-    moved, slip = neutral(flat, FLAT_BODIES, 5e-4, steps, stream)
-    findings.append(at_most("displacement from the stream's, m", moved, 1e-8))
-    findings.append(at_most("slip in a uniform stream of 0.46 m/s, m/s", slip, 1e-8))
-    return findings
+        found[f"displacement over {steps} steps at rest, {count}D, m"] = moved
+        found[f"velocity after {steps} steps at rest, {count}D, m/s"] = fast
+    moved, slip = neutral(flat, FLAT_BODIES, 5e-4, steps, (0.4, 0.23, 0.0))
+    return found | {
+        "displacement from the stream's, m": moved,
+        "slip in a uniform stream of 0.46 m/s, m/s": slip,
+    }
 
-
-LONGWISE = "cells along the long axis"
 
 LONG, SHORT = 0.5, 0.25
 """Semi-axes of I6's ellipse, m."""
@@ -151,66 +144,44 @@ def held_ellipse(
     return float(moment), float(np.hypot(wrench[0], wrench[1]) / (2.0 * LONG))
 
 
-def munk_moment(quick: bool) -> list[Finding]:
-    """I6: moment and force on the ellipse at three incidences."""
-    grids = Grids(LONGWISE, (32, 64, 128) if quick else (16, 32, 64, 128, 256))
-    findings = []
-    for degrees in (45.0,) if quick else (10.0, 30.0, 45.0):
-        exact = float(np.sin(2.0 * np.radians(degrees)))
-        runs = [held_ellipse(n, np.radians(degrees)) for n in grids.cells]
-        moments, forces = zip(*runs, strict=True)
-        series = GridSeries.toward(grids, moments, exact, relative=True)
+def munk_moment(cells: int, incidences: Sequence[float]) -> Figures:
+    """I6: moment and force on the ellipse at some incidences, degrees."""
+    found: dict[str, float | Figure] = {}
+    for degrees in incidences:
+        moment, force = held_ellipse(cells, np.radians(degrees))
         title = f"M over rho U^2 pi (a^2-b^2)/2 at {degrees:g} degrees"
-        findings.append(falling(near(title, series, exact, relative=0.01)))
-        title = f"force over rho U^2 2a at {degrees:g} degrees"
-        findings.append(at_most(title, forces, 0.02, grids))
-    return findings
+        found[title] = Figure(moment, reference=float(np.sin(2.0 * np.radians(degrees))))
+        found[f"force over rho U^2 2a at {degrees:g} degrees"] = force
+    return found
 
 
 RADIUS, ROD = 0.1, 0.5
 """Bob and rod of I7, m."""
 
 
-@dataclass(frozen=True)
-class PendulumBox:
-    """The closed square in which I7's bob swings.
-
-    side   m
-    above  height of the pivot over the square's middle, m
-    grids  cells across it for the wider swings
-    """
-
-    side: float
-    above: float
-    grids: tuple[int, ...]
-
-    @property
-    def added(self) -> float:
-        """Ca of the bob in the middle, by I2's table."""
-        return float(table("I2", "cylinder in closed square, Ca vs D/L")[2.0 * RADIUS / self.side])
-
-
-NARROW, WIDE = PendulumBox(2.0, ROD, (64, 128, 256, 384)), PendulumBox(4.0, 0.0, (128, 256, 512))
-"""With the bob at rest in the middle; for swings by more than 90 degrees, which leave it."""
-
-
-def small_period(ratio: float, added: float) -> float:
-    """I7's formula: s, for a density over the fluid's and a Ca."""
+def small_period(ratio: float, side: float) -> float:
+    """I7's formula: s, for a density over the fluid's and a square of a side (m), in whose middle
+    the bob has the Ca of I2's table."""
+    added = float(table("I2", "cylinder in closed square, Ca vs D/L")[2.0 * RADIUS / side])
     inertia = (ratio + added) * ROD**2 + 0.5 * ratio * RADIUS**2
     return float(2.0 * np.pi * np.sqrt(inertia / (abs(ratio - 1.0) * G * ROD)))
 
 
-def swing(box: PendulumBox, cells: int, ratio: float, degrees: float, period: float) -> float:
+def swing(
+    side: float, above: float, cells: int, ratio: float, degrees: float, period: float
+) -> float:
     """Period in s of the bob, released at an angle from its rest position.
 
-    cells   across the box
+    side    of the closed square in which it swings, m
+    above   height of the pivot over the square's middle, m
+    cells   across the square
     ratio   density over the fluid's: the rod stands on its pivot below 1, and hangs above
     period  expected, s; the step is a hundredth of it, and shorter for a fast bob
     """
-    grid = square(cells, box.side)
+    grid = square(cells, side)
     up = 1.0 if ratio > 1.0 else -1.0
     bob = f'<geom type="sphere" size="{RADIUS}" pos="0 {-up * ROD} 0" density="{ratio}"/>'
-    body = f'<body pos="0 {up * box.above} 0"><joint name="pivot" axis="0 0 1"/>{bob}</body>'
+    body = f'<body pos="0 {up * above} 0"><joint name="pivot" axis="0 0 1"/>{bob}</body>'
     world = make_world(mjcf(body), grid, gravity=(0.0, -G, 0.0))
     world.solid.q[0] = np.radians(degrees)
     fastest = 2.0 * np.pi / period * ROD * np.radians(degrees)
@@ -221,28 +192,27 @@ def swing(box: PendulumBox, cells: int, ratio: float, degrees: float, period: fl
     return float(times[2] - times[0])
 
 
-def pendulum(quick: bool) -> list[Finding]:
-    """I7: period of a heavy bob and of light ones, which stand up, and of wider swings."""
-    grids = (32, 64) if quick else (64, 128, 256)
-    findings = []
-    for ratio in (2.0, 0.5) if quick else (2.0, 0.5, 0.01):
-        exact = small_period(ratio, NARROW.added)
-        found = [swing(NARROW, n, ratio, 5.0, exact) for n in grids]
-        series = GridSeries.toward(Grids("cells a side", grids), found, exact, relative=True)
+def pendulum(cells: int, ratios: Sequence[float]) -> Figures:
+    """I7: period of a heavy bob and of light ones, which stand up, by their density over the
+    fluid's; at rest it is in the middle of a square of 2 m."""
+    found = {}
+    for ratio in ratios:
+        exact = small_period(ratio, 2.0)
         title = f"period at rho_s/rho_f = {ratio:g} let go at 5 degrees, s"
-        findings.append(near(title, series, exact, relative=0.02))
-    if quick:
-        return findings
-    for degrees, factor in table("I7", "amplitude factor").items():
-        if not 5.0 < degrees <= 150.0:
-            continue
-        box = NARROW if degrees <= 90.0 else WIDE
-        exact = small_period(2.0, box.added)
-        values = [swing(box, n, 2.0, degrees, factor * exact) / exact for n in box.grids]
-        title = f"T/T0 at rho_s/rho_f = 2 let go at {degrees:g} degrees"
-        on = Grids("cells a side", box.grids)
-        findings.append(near(title, values, factor, on, relative=0.02))
-    return findings
+        found[title] = Figure(swing(2.0, ROD, cells, ratio, 5.0, exact), reference=exact)
+    return found
+
+
+def wide_swings(cells: int, side: float, above: float, angles: Sequence[float]) -> Figures:
+    """I7: period of wider swings. By more than 90 degrees the bob leaves the middle of a square."""
+    exact, factors = small_period(2.0, side), table("I7", "amplitude factor")
+    return {
+        f"T/T0 at rho_s/rho_f = 2 let go at {degrees:g} degrees": Figure(
+            swing(side, above, cells, 2.0, degrees, factors[degrees] * exact) / exact,
+            reference=factors[degrees],
+        )
+        for degrees in angles
+    }
 
 
 LENGTH = 4.0
@@ -270,12 +240,10 @@ def slug(cells: int, plug: float, mass: float, sides: Boundaries, steps: int, so
     return float(world.solid.v[0]) / (steps * dt) * (mass + LENGTH - plug)
 
 
-def piston(quick: bool) -> list[Finding]:
+def piston(grids: Sequence[int], steps: int) -> Figures:
     """I8: a plug between open ends and in a ring, in the first step and over many."""
-    grids = (8, 16) if quick else (8, 16, 32, 64)
-    steps = 10 if quick else 100
     ends = BoundaryOpen()
-    findings = []
+    found = {}
     for label, sides in (
         ("open channel", Boundaries(ends, ends)),
         ("ring", Boundaries(PERIODIC, PERIODIC)),
@@ -287,12 +255,11 @@ def piston(quick: bool) -> list[Finding]:
                     wrong = max(wrong, abs(slug(n, 0.5, mass, sides, count, False) - 1.0))
                 wrong = max(wrong, abs(slug(8, 0.5, mass, sides, min(count, 10), True) - 1.0))
         between = [slug(n, 0.53, 1.0, sides, 1, False) for n in grids]
-        series = GridSeries.toward(Grids("cells across", grids), between, 1.0)
         lines = ["a plug 0.53 m long, no whole number of cells, displaces whole faces:"]
-        lines += series.lines()
+        lines += GridSeries.toward("cells across", grids, between, 1.0).lines()
         title = f"largest error of (m + M_f) a / F, {label}, plug of whole cells"
-        findings.append(at_most(title, wrong, 1e-6, lines=lines))
-    return findings
+        found[title] = Figure(wrong, lines=lines)
+    return found
 
 
 TURNING = (0.5, 0.35)
@@ -322,27 +289,16 @@ def turning(cells: int) -> Array:
     return np.array(energies) / energies[0]
 
 
-def free_turn(quick: bool) -> list[Finding]:
+def free_turn(grids: Sequence[int]) -> Figures:
     """I9: a body that turns freely in a closed box, and the fluid around it, keep their energy."""
     name = "energy lost in half a turn, cells across the long axis: part"
     allowed = {int(cells): part for cells, part in reference("I9", name).items()}
-    grids = tuple(allowed)[:2] if quick else tuple(allowed)
     runs = [turning(n) for n in grids]
     lost = [float(1.0 - run[-1]) for run in runs]
-    series = GridSeries(LONGWISE, grids, lost, lost)
-    findings = []
+    found: dict[str, float | Figure] = {}
     for n, part in zip(grids, lost, strict=True):
-        title = f"part of the energy lost in half a turn, {n} cells"
         lines = [] if part >= 0.0 else ["the energy is larger than at the start"]
-        findings.append(at_most(title, part, allowed[n], lines=lines, series=series))
-    most = float(max(run.max() for run in runs))
-    return [*findings, at_most("largest energy over that at the start", most, 1.0)]
-
-
-CASES = (
-    Case("I4", neutrally_buoyant),
-    Case("I6", munk_moment),
-    Case("I7", pendulum),
-    Case("I8", piston),
-    Case("I9", free_turn, full=Tier.HALF_HOUR),
-)
+        found[f"part of the energy lost in half a turn, {n} cells"] = Figure(
+            lost, grids, value=part, lines=lines, judged={"absolute": allowed[n]}
+        )
+    return found | {"largest energy over that at the start": max(run.max() for run in runs)}

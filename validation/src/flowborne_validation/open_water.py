@@ -7,6 +7,7 @@ the list names curves and has none.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -14,18 +15,9 @@ import numpy as np
 
 from flowborne import Grid, StepReport, World
 from flowborne.worlds import advance, make_world, velocity_at
-from flowborne_validation.case import Case, Tier, confirmed, reference, table
-from flowborne_validation.findings import (
-    Curve,
-    Details,
-    Finding,
-    Grids,
-    Plot,
-    falling,
-    near,
-    within,
-)
-from flowborne_validation.shedding import CFL, STREAM, UNBOUNDED, backflow, cylinder, judged, shed
+from flowborne_validation.case import reference, table
+from flowborne_validation.findings import Curve, Figure, Figures, Plot, named
+from flowborne_validation.shedding import CFL, STREAM, UNBOUNDED, backflow, cylinder, shed
 from flowborne_validation.worlds import (
     Place,
     Vector,
@@ -36,11 +28,8 @@ from flowborne_validation.worlds import (
     whole_steps,
 )
 
-OPEN_GRIDS = {True: (4,), False: (8, 16, 24, 32)}
-"""Cells across D of B5, B6 and V9, by quick."""
-
 ONCE = (24, 32)
-"""Grids of them and of B4 with one place in the cell, of which each takes half an hour."""
+"""Cells across D of B4, B5, B6 and V9 with one place in the cell; each takes half an hour."""
 
 BACK: Vector = (0.5, 0.0, 0.0)
 LONGEST = 5.5
@@ -51,10 +40,6 @@ UPSTREAM, DOWNSTREAM, ASIDE = 6, 16, 5
 
 BETWEEN: Vector = (0.0, np.sqrt(0.5), np.sqrt(0.5))
 """Between y and z, away from the planes of symmetry."""
-
-
-def across(cells: Sequence[int]) -> Grids:
-    return Grids("cells across D", cells)
 
 
 def open_water(cells: int, place: Place, viscosity: float) -> World:
@@ -72,9 +57,8 @@ def open_water(cells: int, place: Place, viscosity: float) -> World:
     )
 
 
-def steady_cylinder(quick: bool) -> list[Finding]:
+def steady_cylinder(grids: Sequence[int]) -> Figures:
     """B4: drag, length of the backflow and the angle at which the flow leaves the cylinder."""
-    grids = (4, 8) if quick else (8, 16, 24, 32)
 
     def measure(world: World, first: bool) -> tuple[Sequence[float], str]:
         drag, text = steady_drag(
@@ -84,71 +68,50 @@ def steady_cylinder(quick: bool) -> list[Finding]:
         return (drag, backflow(world, BACK, LONGEST), angle), text
 
     build = partial(open_water, viscosity=1.0 / 40.0)
-    (drags, lengths, angles), lines = over_places(grids, build, STREAM, measure, ONCE)
-    return [
-        judged("B4", "Cd", grids, drags, (1.48, 1.62), lines=lines),
-        judged("B4", "bubble length L/D", grids, lengths, (2.13, 2.35)),
-        judged("B4", "separation angle deg", grids, angles, (52.7, 54.2)),
-    ]
+    found, lines = over_places(grids, build, STREAM, measure, ONCE)
+    return named(("Cd", "bubble length L/D", "separation angle deg"), found, grids, lines)
 
 
 def shed_in_the_open(
-    reynolds: float, strouhal: float, grids: Sequence[int], quick: bool
+    reynolds: float, strouhal: float, grids: Sequence[int], periods: int
 ) -> tuple[list[Any], list[str]]:
     """What `shed` measures at a Reynolds number."""
-    return shed(partial(open_water, viscosity=1.0 / reynolds), strouhal, grids, quick, ONCE)
+    return shed(partial(open_water, viscosity=1.0 / reynolds), strouhal, grids, periods, ONCE)
 
 
-def shedding_at_100(quick: bool) -> list[Finding]:
-    """B5: mean drag, amplitude of the lift and frequency at Re 100."""
-    grids = OPEN_GRIDS[quick]
-    (drag, lift, strouhal), lines = shed_in_the_open(100.0, 0.165, grids, quick)
-    return [
-        falling(judged("B5", "Cd mean", grids, drag, (1.31, 1.39), lines=lines)),
-        falling(judged("B5", "Cl amplitude", grids, lift, (0.30, 0.345))),
-        falling(judged("B5", "St", grids, strouhal, (0.160, 0.170))),
-    ]
+def shedding_cylinder(
+    reynolds: float, strouhal: float, grids: Sequence[int], periods: int
+) -> Figures:
+    """B5 and B6: mean drag, amplitude of the lift and frequency."""
+    found, lines = shed_in_the_open(reynolds, strouhal, grids, periods)
+    return named(("Cd mean", "Cl amplitude", "St"), found, grids, lines)
 
 
-def shedding_at_200(quick: bool) -> list[Finding]:
-    """B6: mean drag, amplitude of the lift and frequency at Re 200, and unless quick the frequency
-    at Re 250 to 500."""
-    grids = OPEN_GRIDS[quick]
-    (drag, lift, strouhal), lines = shed_in_the_open(200.0, 0.197, grids, quick)
-    return [
-        judged("B6", "Cd mean", grids, drag, (1.17, 1.41), lines=lines),
-        judged("B6", "Cl amplitude", grids, lift, (0.50, 0.70)),
-        judged("B6", "St", grids, strouhal, (0.190, 0.203)),
-        *([] if quick else frequencies()),
-    ]
-
-
-def frequencies() -> list[Finding]:
-    """Frequency over the Reynolds number, against Gerris's."""
-    known, grids = table("B6", "St(Re) Gerris 250..500"), (8, 16)
-    found = {re: shed_in_the_open(re, st, grids, False)[0][2] for re, st in known.items()}
+def frequencies(grids: Sequence[int], periods: int) -> Figures:
+    """B6: frequency over the Reynolds number, against Gerris's."""
+    known = table("B6", "St(Re) Gerris 250..500")
+    found = {re: shed_in_the_open(re, st, grids, periods)[0][2] for re, st in known.items()}
     curves = (
         Curve("Gerris", list(known), list(known.values()), True),
         Curve("flowborne", list(known), [float(np.mean(st[-1])) for st in found.values()]),
     )
     plots = {min(known): Plot("Reynolds number", "Strouhal number", curves)}
-    return [
-        near(f"St at Re {re:g}", st, known[re], across(grids), relative=0.03, plot=plots.get(re))
+    return {
+        f"St at Re {re:g}": Figure(st, grids, known[re], plot=plots.get(re))
         for re, st in found.items()
-    ]
+    }
 
 
-def held_at_185(quick: bool) -> list[Finding]:
+def held_at_185(grids: Sequence[int], periods: int) -> Figures:
     """V9: the figures of the cylinder while it is held."""
-    held, grids = "fixed cylinder Re=185", OPEN_GRIDS[quick]
-    (drag, lift, strouhal), lines = shed_in_the_open(185.0, 0.195, grids, quick)
+    (drag, lift, strouhal), lines = shed_in_the_open(185.0, 0.195, grids, periods)
+    exact = reference("V9", "fixed cylinder Re=185")
     measured = drag, [np.sqrt(0.5) * np.array(values) for values in lift], strouhal
-    findings: list[Finding] = []
-    for (name, exact), values in zip(reference("V9", held).items(), measured, strict=True):
-        details = Details(confirmed=confirmed("V9", held), lines=[] if findings else lines)
-        title, on = f"{name}, held", across(grids)
-        findings.append(near(title, values, exact, on, relative=0.05, **details))
-    return findings
+    found = named([f"{name}, held" for name in exact], measured, grids, lines)
+    return {
+        name: replace(figure, reference=known)
+        for (name, figure), known in zip(found.items(), exact.values(), strict=True)
+    }
 
 
 def quarter(cells: int, place: Place, reynolds: float) -> World:
@@ -174,11 +137,6 @@ def steady_drag(
     tail = round(1.0 / dt)
     before, after = (coefficient(advance(world, dt, n)) for n in (steps - tail, tail))
     return after, f"Cd changes by {after - before:.2g} in the last D/U"
-
-
-def of_sphere(report: StepReport) -> float:
-    """Cd = F / (rho U^2 / 2  pi D^2 / 4); the quarter has a quarter of F."""
-    return float(4.0 * force_on(report)[0] * 8.0 / np.pi)
 
 
 def recirculation(world: World) -> float:
@@ -216,36 +174,24 @@ def separation(world: World, aside: Vector) -> float:
     return 2.0 * turns[0] - turns[1]
 
 
-def sphere(quick: bool) -> list[Finding]:
+def sphere(grids: Sequence[int], once: Sequence[int]) -> Figures:
     """B7: drag at Re 100 and 150, and the bubble behind the sphere at Re 100."""
-    # on 12 cells a place takes a quarter of an hour
-    grids, once = ((4,), ()) if quick else ((6, 8, 12), (12,))
-    findings = []
+
+    def measure(world: World, first: bool) -> tuple[Sequence[float], str]:
+        # Cd = F / (rho U^2 / 2  pi D^2 / 4); the quarter has a quarter of F
+        drag, text = steady_drag(
+            world, 16.0 if first else 6.0, lambda report: 32.0 * force_on(report)[0] / np.pi
+        )
+        return (drag, recirculation(world), separation(world, BETWEEN)), text
+
+    found: dict[str, Figure] = {}
     for reynolds in (100, 150):
-
-        def measure(world: World, first: bool) -> tuple[Sequence[float], str]:
-            drag, text = steady_drag(world, 16.0 if first else 6.0, of_sphere)
-            return (drag, recirculation(world), separation(world, BETWEEN)), text
-
         build = partial(quarter, reynolds=reynolds)
         (drags, lengths, angles), lines = over_places(grids, build, STREAM, measure, once)
         exact = float(reference("B7", f"Cd({reynolds})"))
-        title, on = f"Cd at Re {reynolds}", across(grids)
-        findings.append(falling(near(title, drags, exact, on, relative=0.03, lines=lines)))
+        found[f"Cd at Re {reynolds}"] = Figure(drags, grids, exact, lines=lines)
         if reynolds == 100:
-            length = float(reference("B7", "L/D(100)"))
             angle = float(reference("B7", "separation angle").removesuffix(" deg"))
-            findings += [
-                within("L/D at Re 100", lengths, length, (0.85, 0.90), on),
-                near("separation angle at Re 100", angles, angle, on, absolute=2.0),
-            ]
-    return findings
-
-
-CASES = (
-    Case("B4", steady_cylinder, Tier.HALF_HOUR, coarse=True),
-    Case("B5", shedding_at_100, Tier.HALF_HOUR, coarse=True),
-    Case("B6", shedding_at_200, Tier.HALF_HOUR, coarse=True),
-    Case("V9", held_at_185, Tier.HALF_HOUR, coarse=True),
-    Case("B7", sphere, full=Tier.HALF_HOUR, coarse=True),
-)
+            found["L/D at Re 100"] = Figure(lengths, grids)
+            found["separation angle at Re 100"] = Figure(angles, grids, angle)
+    return found

@@ -17,7 +17,7 @@ Lengths are cm and angles degrees, as published. A link's direction points to th
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Sequence
 from time import perf_counter
 
 import numpy as np
@@ -25,8 +25,8 @@ from scipy.interpolate import CubicSpline
 
 from flowborne import Array, Simulation, load_scene
 from flowborne.bodies import kinematics
-from flowborne_validation.case import Case, reference
-from flowborne_validation.findings import Finding, Grids, at_most
+from flowborne_validation.case import reference
+from flowborne_validation.findings import Figure, Figures
 from flowborne_validation.measurements import rows_of
 from flowborne_validation.worlds import frames_of
 
@@ -149,30 +149,30 @@ def quantities(simulation: Simulation) -> Array:
     return np.array([*centre, *head, np.degrees(q[model.positions_of("heading")[0]])])
 
 
-def compared(amplitude: int, cells: tuple[int, ...], scene: str = "eel") -> list[Finding]:
-    """Errors of the robot on some grids, of which the last is judged, and of other simulators."""
+def compared(amplitude: int, grids: Sequence[int], scene: str = "eel") -> Figures:
+    """R1: errors of the robot on some grids, of which the last is judged, and of other simulators.
+    They should be at most those of the robot's own simulator, Aquarium."""
     runs = measured(amplitude)
-    paths, seconds = zip(*(swim(amplitude, n, scene=scene) for n in cells), strict=True)
+    paths, seconds = zip(*(swim(amplitude, n, scene=scene) for n in grids), strict=True)
     errors = np.array([rmse(path - path[0], runs) for path in paths])
-    least, grids = scatter(runs), Grids("cells across the tank", cells)
+    least = scatter(runs)
     times = [
         f"{n:>6} cells across the tank: 4 s in {spent:.0f} s"
-        for n, spent in zip(cells, seconds, strict=True)
+        for n, spent in zip(grids, seconds, strict=True)
     ]
-    findings = []
+    found = {}
     for n, quantity in enumerate(QUANTITIES):
         aquarium, genesis = (
             reference("R1", simulator)[str(amplitude)][quantity]
             for simulator in ("Aquarium", "Genesis")
         )
-        title = f"{scene}, gait of {amplitude} degrees: RMSE of {quantity}"
         delay = delay_lines(paths[-1] - paths[-1][0], amplitude, runs) if n == HEADING else []
         others = f"Aquarium {aquarium:g}, Genesis {genesis:g}"
         scattered = f"mean of the {len(runs)} runs {least[n]:.3f}"
         lines = [*times, *delay, f"{others}, {scattered}"]
-        found = at_most(title, errors[:, n], aquarium, grids, tolerance="at most", lines=lines)
-        findings.append(replace(found, reference=aquarium))
-    return findings
+        title = f"{scene}, gait of {amplitude} degrees: RMSE of {quantity}"
+        found[title] = Figure(errors[:, n], grids, aquarium, lines=lines)
+    return found
 
 
 def delay_lines(changes: Array, amplitude: int, runs: Array) -> list[str]:
@@ -183,19 +183,3 @@ def delay_lines(changes: Array, amplitude: int, runs: Array) -> list[str]:
         f"late by {1e3 * late:.0f} ms: {left:.3f} without that",
         f"by the times in the logs, to which the published comparison does not keep: {own:.3f}",
     ]
-
-
-def robot(quick: bool) -> list[Finding]:
-    """R1: errors at most those of the robot's own simulator, Aquarium."""
-    if quick:
-        return compared(20, (122,))
-    runs = (("eel", (122, 183, 244)), ("eel-room", (61, 92, 122)))
-    return [
-        finding
-        for scene, cells in runs
-        for amplitude in (20, 40)
-        for finding in compared(amplitude, cells, scene)
-    ]
-
-
-CASES = (Case("R1", robot, coarse=True),)

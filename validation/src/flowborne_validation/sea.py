@@ -19,21 +19,14 @@ from flowborne.worlds import (
     set_going,
     set_velocity,
 )
-from flowborne_validation.case import Case, Tier, reference
-from flowborne_validation.far_sides import EEL_CELL, WHOLE, box, eel_way, way_over
-from flowborne_validation.findings import Finding, Grids, falling, near
+from flowborne_validation.case import reference
+from flowborne_validation.far_sides import EEL_CELL, WHOLE, box, eel_way, way_in
+from flowborne_validation.findings import Figure, Figures, named
 from flowborne_validation.shedding import CFL, STREAM, cylinder, shed
 from flowborne_validation.worlds import ORIGIN, Place, force_on, mjcf
 
-GRIDS = {True: (8,), False: (8, 16, 32)}
-"""Cells across D, by quick."""
-
-BOXES = {(12, 8): (4.0, 1.0), (8, 6): (3.0, 2.0)}
-"""Length and width of a box in D -> diameters ahead of the cylinder, and how much wider what is
-required is than in the first."""
-
-REQUIRED = {"Cd mean": 0.02, "Cl amplitude": 0.05, "St": 0.02}
-"""Relative, in the first box."""
+AHEAD = {12: 4.0, 8: 3.0}
+"""Length of a box in D -> diameters ahead of the cylinder."""
 
 PLACES = ((0.0, 0.0), (1 / 3, 2 / 3), (2 / 3, 1 / 3))
 """Places of the eel in a cell of the grid, by which its way in 4 s differs by 2 %."""
@@ -47,8 +40,8 @@ UPSTREAM = -1.0, 0.0
 
 
 def around(cells: int, place: Place, length: int, width: int) -> Grid:
-    """A box of BOXES; the cylinder is at the origin, in a place of its cell."""
-    x, y = -BOXES[length, width][0] - place[0] / cells, -0.5 * width - place[1] / cells
+    """A box in D; the cylinder is at the origin, in a place of its cell."""
+    x, y = -AHEAD[length] - place[0] / cells, -0.5 * width - place[1] / cells
     return box(cells, (x, y), (x + length, y + width))
 
 
@@ -64,17 +57,15 @@ def in_stream(cells: int, place: Place, length: int, width: int) -> World:
     )
 
 
-def cylinder_in_sea(quick: bool) -> list[Finding]:
-    """B8: B5's figures in small boxes; unless quick in the smaller one too."""
-    findings, on = list[Finding](), Grids("cells across D", GRIDS[quick])
-    for (length, width), (_, wider) in list(BOXES.items())[: 1 if quick else None]:
-        build = partial(in_stream, length=length, width=width)
-        figures, lines = shed(build, 0.165, GRIDS[quick], quick)
-        for (name, relative), values in zip(REQUIRED.items(), figures, strict=True):
-            title, exact = f"{name} in {length} x {width} D", float(reference("B5", name))
-            bound, shown = wider * relative, lines if name == "Cd mean" else ()
-            findings.append(falling(near(title, values, exact, on, relative=bound, lines=shown)))
-    return findings
+def cylinder_in_sea(grids: Sequence[int], periods: int, length: int, width: int) -> Figures:
+    """B8: B5's figures in a small box. In the smaller one more error is accepted."""
+    build = partial(in_stream, length=length, width=width)
+    found, lines = shed(build, 0.165, grids, periods)
+    names = ("Cd mean", "Cl amplitude", "St")
+    return {
+        f"{name} in {length} x {width} D": replace(figure, reference=float(reference("B5", name)))
+        for name, figure in named(names, found, grids, lines).items()
+    }
 
 
 def towed(cells: int) -> World:
@@ -97,31 +88,27 @@ def drag(world: World, velocity: Sequence[float], duration: float) -> float:
     return float(2.0 * np.mean(forces[-last:]))
 
 
-def towed_over_held(quick: bool) -> Finding:
-    """The same flow seen from the water and from the cylinder."""
-    ratios = []
-    for cells in GRIDS[quick]:
-        held = in_stream(cells, ORIGIN, 12, 8)
-        set_velocity(held, STREAM)
-        at_rest = drag(held, (0.0, 0.0), 5.0)
-        ratios.append(drag(towed(cells), UPSTREAM, 5.0) / at_rest)
+def towed_over_held(cells: int) -> Figures:
+    """I11: the same flow seen from the water and from the cylinder."""
+    held = in_stream(cells, ORIGIN, 12, 8)
+    set_velocity(held, STREAM)
+    at_rest = drag(held, (0.0, 0.0), 5.0)
     title = "drag of a towed cylinder in a window over that of a held one in a stream, at 5 D/U"
-    on = Grids("cells across D", GRIDS[quick])
-    return falling(near(title, ratios, 1.0, on, relative=0.02))
+    return {title: drag(towed(cells), UPSTREAM, 5.0) / at_rest}
 
 
-def eel() -> list[Finding]:
-    """The eel's mean way from PLACES in windows that follow it, against a domain that holds all of
-    it."""
+def eel() -> Figures:
+    """I11: the eel's mean way from PLACES in windows that follow it, against a domain that holds
+    all of it."""
     windows = ((0.36, -0.09), (0.86, 0.81)), ((0.2, -0.25), (1.02, 0.95))
     large = ways(*WHOLE, "nothing")
-    found = []
+    found = {}
     for low, high in windows:
         own = ways(low, high, "bodies")
         lines = [f"{name}: {way.mean():.4f} m, from {way.min():.4f} to {way.max():.4f} m"
                  for name, way in (("in the window", own), ("in the domain", large))]  # fmt: skip
         ratio = float(own.mean() / large.mean())
-        found.append(replace(way_over(ratio, low, high, "a window of "), lines=lines))
+        found[way_in(low, high, "a window of ")] = Figure(ratio, lines=lines)
     return found
 
 
@@ -130,14 +117,3 @@ def ways(low: tuple[float, float], high: tuple[float, float], follow: str) -> Ar
     shifts = [(EEL_CELL * a, EEL_CELL * b) for a, b in PLACES]
     corners = [((low[0] + x, low[1] + y), (high[0] + x, high[1] + y)) for x, y in shifts]
     return np.array([eel_way(*both, seconds=4, follow=follow) for both in corners])
-
-
-def in_windows(quick: bool) -> list[Finding]:
-    """I11: a towed cylinder, and unless quick the way of the eel."""
-    return [towed_over_held(quick), *([] if quick else eel())]
-
-
-CASES = (
-    Case("B8", cylinder_in_sea, Tier.HALF_HOUR, coarse=True),
-    Case("I11", in_windows, full=Tier.HALF_HOUR, coarse=True),
-)

@@ -5,26 +5,15 @@ V1 is in centimetres, grams and seconds, V2 in SI units.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
 
 import numpy as np
 
 from flowborne import Array, Grid, World
 from flowborne.bodies import WindForce
 from flowborne.worlds import Boundaries, BoundaryClosed, BoundaryNoSlip, make_world
-from flowborne_validation.case import Case, confirmed, reference
-from flowborne_validation.findings import (
-    Curve,
-    Details,
-    Finding,
-    Grids,
-    GridSeries,
-    Plot,
-    at_most,
-    falling,
-    near,
-    within,
-)
+from flowborne_validation.case import reference
+from flowborne_validation.findings import Curve, Figure, Figures, Plot
 from flowborne_validation.worlds import PLANAR, history, mjcf, recorded, whole_steps
 
 CFL = 1.0
@@ -35,40 +24,12 @@ CYLINDER, CYLINDER_GRAVITY = 0.25, 980.0
 """Diameter in cm and cm/s^2, of V1."""
 
 
-@dataclass(frozen=True)
-class Fall:
-    """One of V1's two cases.
+def box(cells: int, density: float, viscosity: float) -> World:
+    """The box of 2 by 6 cm, `cells` across the cylinder, which is free in the plane.
 
-    name       in the list
     density    g/cm^3, of the cylinder; the fluid's is 1
     viscosity  g/(cm s)
-    low, high  range of the published largest Reynolds numbers
-    duration   s, until the cylinder nears the bottom
     """
-
-    name: str
-    density: float
-    viscosity: float
-    low: float
-    high: float
-    duration: float
-
-    @property
-    def reynolds(self) -> float:
-        """The largest Reynolds number in the list."""
-        return float(reference("V1", f"{self.name} max Re"))
-
-    @property
-    def unit(self) -> float:
-        """Re over the velocity in cm/s: rho_s d / mu."""
-        return self.density * CYLINDER / self.viscosity
-
-
-FALLS = (Fall("case 1", 1.25, 0.1, 17.2, 17.5, 0.6), Fall("case 2", 1.5, 0.01, 438.0, 503.0, 0.3))
-
-
-def box(fall: Fall, cells: int) -> World:
-    """The box of 2 by 6 cm, `cells` across the cylinder, which is free in the plane."""
     h = CYLINDER / cells
     wall = BoundaryNoSlip()
     disc = (
@@ -79,30 +40,33 @@ def box(fall: Fall, cells: int) -> World:
         mjcf(disc),
         Grid.slab(8 * cells, 24 * cells, h, (0.0, 0.0)),
         gravity=(0.0, -CYLINDER_GRAVITY, 0.0),
-        solid_density=fall.density,
-        viscosity=fall.viscosity,
+        solid_density=density,
+        viscosity=viscosity,
         boundaries=Boundaries(wall, wall, wall, wall),
     )
 
 
-def fastest(fall: Fall, cells: int) -> tuple[float, Array]:
-    """Largest Reynolds number, and (n, 2) times in s and Reynolds numbers of all steps."""
-    world = box(fall, cells)
-    count, dt = whole_steps(fall.duration, CFL * CYLINDER / cells * fall.unit / fall.reynolds)
-    course = recorded(world, dt, count, lambda _: (world.time, -fall.unit * world.solid.v[1]))
+def fastest(
+    cells: int, density: float, viscosity: float, reynolds: float, duration: float
+) -> tuple[float, Array]:
+    """Largest Reynolds number, and (n, 2) times in s and Reynolds numbers of all steps.
+
+    reynolds  the largest one expected; `duration` s later the cylinder nears the bottom
+    """
+    world = box(cells, density, viscosity)
+    unit = density * CYLINDER / viscosity
+    count, dt = whole_steps(duration, CFL * CYLINDER / cells * unit / reynolds)
+    course = recorded(world, dt, count, lambda _: (world.time, -unit * world.solid.v[1]))
     return float(course[:, 1].max()), course
 
 
-def settling_cylinder(quick: bool) -> list[Finding]:
-    """V1: the largest Reynolds number of the light and slow and of the heavy and fast cylinder."""
-    findings = []
-    grids = Grids("cells across D", (4, 6) if quick else (8, 16, 32))
-    for fall in FALLS:
-        values = [fastest(fall, n)[0] for n in grids.cells]
-        title, interval = f"{fall.name}, largest Re", (fall.low, fall.high)
-        sure = confirmed("V1", f"{fall.name} max Re")
-        findings.append(within(title, values, fall.reynolds, interval, grids, confirmed=sure))
-    return findings
+def settling_cylinder(
+    cells: int, name: str, density: float, viscosity: float, duration: float
+) -> Figures:
+    """V1: the largest Reynolds number of the light and slow or of the heavy and fast cylinder."""
+    reynolds = float(reference("V1", f"{name} max Re"))
+    found, _ = fastest(cells, density, viscosity, reynolds, duration)
+    return {f"{name}, largest Re": Figure(found, reference=reynolds)}
 
 
 DIAMETER, DENSITY, GRAVITY = 0.015, 1120.0, 9.81
@@ -111,37 +75,13 @@ HALF, HEIGHT, START = 0.05, 0.16, 0.1275
 from which its centre falls, m."""
 
 
-@dataclass(frozen=True)
-class Oil:
-    """One of V2's experiments.
-
-    density, viscosity  kg/m^3, Pa s
-    """
-
-    name: str
-    density: float
-    viscosity: float
-
-    @property
-    def peak(self) -> float:
-        """Largest velocity measured, m/s."""
-        share = reference("V2", "max measured / u_inf")[self.name]
-        return float(share * reference("V2", "u_inf (unbounded) m/s")[self.name])
-
-    @property
-    def curve(self) -> tuple[Array, Array]:
-        """Times in s and downward velocities in m/s that were measured."""
-        times, velocities = np.array(reference("V2", "experimental t[s],u[m/s]")[self.name]).T
-        return times, -velocities
-
-
-OILS = (Oil("E1", 970.0, 0.373), Oil("E3", 962.0, 0.113))
-
-
-def quarter(oil: Oil, cells: int) -> World:
+def quarter(cells: int, density: float, viscosity: float) -> World:
     """A quarter of the box, `cells` in 10 mm, between two planes about which the flow is symmetric.
     A quarter of the sphere's weight less its buoyancy pulls at a quarter of its mass. The whole box
-    gives the same velocities to 5e-7 m/s with 4 cells in 10 mm."""
+    gives the same velocities to 5e-7 m/s with 4 cells in 10 mm.
+
+    density, viscosity  of the oil, kg/m^3 and Pa s
+    """
     h = 0.01 / cells
     counts = [round(side / h) for side in (HALF, HALF, HEIGHT)]
     grid = Grid((counts[0], counts[1], counts[2]), h, (0.0, 0.0, 0.0))
@@ -151,53 +91,59 @@ def quarter(oil: Oil, cells: int) -> World:
         f'<geom type="sphere" size="{0.5 * DIAMETER}"/></body>'
     )
     volume = 0.25 * np.pi / 6.0 * DIAMETER**3
-    pull = WindForce((0.0, 0.0, -(DENSITY - oil.density) * volume * GRAVITY), ("ball",))
+    pull = WindForce((0.0, 0.0, -(DENSITY - density) * volume * GRAVITY), ("ball",))
     return make_world(
         mjcf(ball),
         grid,
         solid_density=0.25 * DENSITY,
-        density=oil.density,
-        viscosity=oil.viscosity,
+        density=density,
+        viscosity=viscosity,
         boundaries=Boundaries(plane, wall, plane, wall, wall, wall),
         winds=(pull,),
     )
 
 
-def fall(oil: Oil, cells: int, until: float) -> tuple[Array, Array, Array]:
-    """Times in s, downward velocities in m/s and heights of the centre in m of every step."""
-    world = quarter(oil, cells)
-    steps, dt = whole_steps(until, CFL * 0.01 / cells / oil.peak)
+def fall(world: World, cells: int, peak: float, until: float) -> tuple[Array, Array, Array]:
+    """Times in s, downward velocities in m/s and heights of the centre in m of every step.
+
+    peak  largest velocity expected, m/s
+    """
+    steps, dt = whole_steps(until, CFL * 0.01 / cells / peak)
     times, velocities, heights = history(
         world, dt, steps, lambda: (world.time, -world.solid.v[0], START + world.solid.q[0])
     ).T
     return times, velocities, heights
 
 
-def settling(quick: bool) -> list[Finding]:
-    """V2: the largest velocity, and the whole curve from release to the bottom."""
-    findings = []
-    cells = (3, 4) if quick else (4, 6, 8, 10)
-    grids = Grids("cells across the sphere", [100.0 * DIAMETER * n for n in cells])
-    for oil in OILS:
-        times, measured = oil.curve
-        until = 0.4 * times[-1] if quick else times[-1]
-        times, measured = times[times <= until], measured[times <= until]
-        falls = [fall(oil, n, until) for n in cells]
-        peaks = [velocity.max() for _, velocity, _ in falls]
-        series = GridSeries.toward(grids, peaks, oil.peak, relative=True)
-        title = f"{oil.name}, largest velocity, m/s"
-        findings.append(falling(near(title, series, oil.peak, relative=0.03)))
-        found = [apart(one, times, measured, oil.peak) for one in falls]
-        title = f"{oil.name}, farthest from the measured curve over its largest velocity"
-        moments, velocity, _ = falls[-1]
-        thin = slice(None, None, max(1, len(moments) // 200))
-        curves = (
-            Curve("measured", times, measured, True),
-            Curve("flowborne", moments[thin], velocity[thin]),
-        )
-        details = Details(lines=found[-1][1], plot=Plot("t (s)", "downward velocity (m/s)", curves))
-        findings.append(at_most(title, [away for away, _ in found], 0.05, grids, **details))
-    return findings
+def settling(
+    cells: Sequence[int], part: float, name: str, density: float, viscosity: float
+) -> Figures:
+    """V2: the largest velocity, and the curve from release to the bottom, or a part of it, of one
+    of the experiments.
+
+    cells  in 10 mm
+    """
+    times, velocities = np.array(reference("V2", "experimental t[s],u[m/s]")[name]).T
+    share, unbounded = (
+        reference("V2", key)[name] for key in ("max measured / u_inf", "u_inf (unbounded) m/s")
+    )
+    peak, until = float(share * unbounded), part * times[-1]
+    times, measured = times[times <= until], -velocities[times <= until]
+    falls = [fall(quarter(n, density, viscosity), n, peak, until) for n in cells]
+    away, lines = zip(*(apart(one, times, measured, peak) for one in falls), strict=True)
+    moments, velocity, _ = falls[-1]
+    thin = slice(None, None, max(1, len(moments) // 200))
+    curves = (
+        Curve("measured", times, measured, True),
+        Curve("flowborne", moments[thin], velocity[thin]),
+    )
+    plot = Plot("t (s)", "downward velocity (m/s)", curves)
+    grids = [100.0 * DIAMETER * n for n in cells]
+    title = f"{name}, farthest from the measured curve over its largest velocity"
+    return {
+        f"{name}, largest velocity, m/s": Figure([v.max() for _, v, _ in falls], grids, peak),
+        title: Figure(away, grids, lines=lines[-1], plot=plot),
+    }
 
 
 def apart(
@@ -215,6 +161,3 @@ def apart(
         for label, part in (("all the way", high | True), ("first nine tenths of the way", high))
     ]
     return float(away.max()), lines
-
-
-CASES = (Case("V1", settling_cylinder, coarse=True), Case("V2", settling, coarse=True))

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Unpack
+from typing import Any
 
 import numpy as np
 
 from flowborne import Array, StepReport, World
 from flowborne.worlds import Field, velocity_at
-from flowborne_validation.case import confirmed, reference
-from flowborne_validation.findings import Details, Figures, Finding, Grids, within
 from flowborne_validation.worlds import (
     Place,
     Uniform,
@@ -25,9 +23,6 @@ from flowborne_validation.worlds import (
 BEFORE, AFTER = 40.0, 15.0
 """Times D/U before a flow that sheds vortices is evaluated: in the first world, where shedding has
 to begin and in open water takes twice as long, and in one that starts from the flow of another."""
-
-PERIODS = {True: 2, False: 4}
-"""Evaluated periods, by quick."""
 
 CFL = 1.0
 """Cells that the oncoming flow crosses in a step."""
@@ -169,15 +164,15 @@ def shed(
     build: Callable[[int, Place], World],
     strouhal: float,
     grids: Sequence[int],
-    quick: bool,
+    periods: int,
     once: Sequence[int] = (),
 ) -> tuple[list[Any], list[str]]:
     """Mean drag, amplitude of the lift and frequency of a cylinder at the origin in UNBOUNDED, as
     `over_places` has them, by the cells across D.
 
     strouhal  rough value of the expected frequency
+    periods   that are evaluated
     """
-    periods = PERIODS[quick]
 
     def measure(world: World, first: bool) -> tuple[Sequence[float], str]:
         before = 2.0 * BEFORE if first else AFTER
@@ -188,17 +183,3 @@ def shed(
         return figures, seen.unsteadiness(periods)
 
     return over_places(grids, build, Kicked(STREAM, UNBOUNDED, 0.0, 0.0), measure, once)
-
-
-def judged(
-    name: str,
-    quantity: str,
-    grids: Sequence[int],
-    values: Figures,
-    interval: tuple[float, float],
-    **details: Unpack[Details],
-) -> Finding:
-    """A quantity of the case `name` on some grids, inside an interval of the list."""
-    exact, on = reference(name, quantity), Grids("cells across D", grids)
-    details["confirmed"] = confirmed(name, quantity)
-    return within(quantity, values, exact, interval, on, **details)
