@@ -204,9 +204,7 @@ def test_blown_up_trial_says_what_was_tried(
     make_world: MakeWorld, step: Step, outcome: Outcome
 ) -> None:
     def blow_up(world: World, dt: float, command: JointCommand | None = None) -> StepReport:
-        report = step(world, dt, command)
-        report.outcome = outcome
-        return report
+        return replace(step(world, dt, command), outcome=outcome)
 
     trial = trial_of(make_world(), blow_up, Hypothesis(0.1), SHOULDER, [0.25])
     with pytest.raises(

@@ -32,7 +32,7 @@ from flowborne.coupling.operators import (
     pressure_push,
     side_push,
 )
-from flowborne.coupling.report import Outcome, Timer
+from flowborne.coupling.report import Outcome, timed
 from flowborne.coupling.viscous_solve import diffuse
 from flowborne.coupling.world import Fluid, World
 from flowborne.fluid.grid import Array, Faces, Grid, faces_of
@@ -150,6 +150,7 @@ def solve_bodies(driven: Driven, torque_limit: Array, size: int) -> Solved:
     return Solved(driven, driven.velocity, actuator, nothing, nothing, None, None, outcome, left)
 
 
+@timed("projection")
 def solve_together(
     world: World,
     velocity: Faces,
@@ -159,7 +160,6 @@ def solve_together(
     cut: Geometry,
     jets: tuple[Jet, ...],
     torque_limit: Array,
-    timer: Timer,
 ) -> Solved:
     """Viscosity, pressure and bodies at the end of the step (section 6, item 6).
 
@@ -183,9 +183,7 @@ def solve_together(
         tolerance = max(tolerance, TIGHTENING)
     rate = source_rate(fluid, world.time + dt, cut.open)
     add_rates(rate, jets)
-    timer.lap("projection")
     smooth, viscous, smoothed = diffuse(world, velocity, mass, gradient, cut, jets, pose, driven)
-    timer.lap("viscosity")
     term = LowRankTerm(cut.rows, mobility)
     net = net_outflow(smooth, cut, rate, fluid)
     carried = leak_proof(smooth, cut, boundary_velocity(pose, driven.velocity), fluid.grid)
@@ -202,7 +200,6 @@ def solve_together(
         v = driven.after(impulse)
         actuator = driven.actuator(v, impulse)
         changed = correct(driven, v, actuator, torque_limit)
-        timer.lap("projection")
         if changed is None and tolerance <= fluid.tolerance:
             break
         if changed is not None:
@@ -211,7 +208,6 @@ def solve_together(
                 smooth, viscous, smoothed = diffuse(
                     world, velocity, mass, gradient, cut, jets, pose, changed
                 )
-                timer.lap("viscosity")
                 net = net_outflow(smooth, cut, rate, fluid)
             tried, driven = driven, changed
         tolerance = max(fluid.tolerance, TIGHTENING * tolerance)
@@ -242,7 +238,6 @@ def solve_together(
         if yielding.size:
             plain = PressureSystem(weights, fluid.boundaries.periodic(), beyond=beyond)
         added = added_mass_impulse(plain, cut, change)
-    timer.lap("projection")
     return Solved(driven, v, actuator, viscous, added, smooth, projected, outcome, left)
 
 

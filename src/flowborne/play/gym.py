@@ -25,9 +25,9 @@ from flowborne.base.extras import optional
 from flowborne.control.commands import Command, Position, Torque, Velocity, servo_of, torque_limit
 from flowborne.control.measurement import Measurement
 from flowborne.kernels.arrays import Array
-from flowborne.runs.frame_report import FrameReport
 from flowborne.scenes.load import load_scene
 from flowborne.scenes.schema import Scene
+from flowborne.sim.frame import FrameReport
 from flowborne.sim.simulation import BlowUpError, Simulation
 from flowborne.solids.model import SLIDE
 

@@ -21,8 +21,9 @@ from flowborne.runs.run_folder import RunFolder, RunFolderError
 from flowborne.scenes.changes import ChangeTable
 from flowborne.scenes.scene_copy import with_frames
 from flowborne.scenes.schema import Scene
+from flowborne.sim.frame import Snapshot
 from flowborne.sim.running import RunOutcome, run
-from flowborne.sim.simulation import Simulation, Snapshot
+from flowborne.sim.simulation import Simulation
 from flowborne.view.run import PLOTTED
 
 State = dict[str, NDArray[Any]]
