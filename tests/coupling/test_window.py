@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flowborne.control.executors import pack
 from flowborne.coupling.step import step
 from flowborne.coupling.window import cells_to_follow, follow
 from flowborne.coupling.world import World
@@ -180,7 +179,7 @@ def test_a_window_that_has_no_reason_to_move_gives_the_bits_of_a_fixed_domain() 
     assert all(np.array_equal(world.arrays()[k], v) for k, v in fixed.arrays().items())
 
 
-def test_a_moved_world_is_restored_and_sent_without_its_setup() -> None:
+def test_a_moved_world_is_restored_and_sent() -> None:
     world = windowed(SPHERE, Grid((16, 16, 16), 1 / 8, (-1.0,) * 3), (1.0, 0.0, 0.5),
                      Boundaries(*(FAR,) * 6), (0, 1, 2))  # fmt: skip
     home = world.setup
@@ -188,7 +187,6 @@ def test_a_moved_world_is_restored_and_sent_without_its_setup() -> None:
     for _ in range(5):
         step(world, DT)
     assert not np.array_equal(corner(world), home.fluid.grid.origin)  # type: ignore[union-attr]
-    assert len(pack(world.setup, home)) < 1000
     again = World.from_arrays(home, {k: v.copy() for k, v in world.arrays().items()})
     sent = pickle.loads(pickle.dumps(world))
     step(world, DT)
