@@ -117,7 +117,7 @@ class Trial:
         in the displacement.
         """
         hypothesis, rigid, v = self.course.hypothesis, self.course.rigid, world.solid.v
-        own = ~np.isin(self.course.dofs, world.setup.told.dofs())
+        own = ~np.isin(self.course.dofs, world.told.dofs())
         dofs = self.course.dofs[own]
         rate = self.displacement[own] / hypothesis.duration
         if hypothesis.velocities == "present":

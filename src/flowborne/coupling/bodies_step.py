@@ -50,7 +50,7 @@ def equations(
 ) -> Driven:
     """The bodies' own equations of motion under a generalised force (nv,), with the drives."""
     goal, limit, model = command.final_velocity, command.torque_limit, world.setup.solid
-    force = force + world.setup.told.force_on(model.nv)
+    force = force + world.told.force_on(model.nv)
     return drive(model, world.solid, force, dt, before, command.prescribed, goal, limit)
 
 

@@ -46,7 +46,7 @@ def report_bodies(world: World, dt: float, solved: Solved, known: dict[str, Any]
     """
     before, model = solved.driven.system.v, world.setup.solid
     velocity = 0.5 * (before + solved.v)
-    actuator = solved.actuator + world.setup.told.force_on(model.nv)
+    actuator = solved.actuator + world.told.force_on(model.nv)
     return StepReport(
         dt,
         solved.outcome if np.isfinite(solved.v).all() else Outcome.NOT_FINITE,

@@ -15,6 +15,7 @@ from threadpoolctl import ThreadpoolController
 
 from flowborne.base.errors import PartError, SceneError, described
 from flowborne.control.commands import Commands, Drives, drives_of, told_by
+from flowborne.coupling.motion import NOTHING_TOLD
 from flowborne.coupling.report import BREAKDOWNS, Outcome, StepReport
 from flowborne.coupling.sensed import BodyState, JointState
 from flowborne.coupling.stream import FlowState, flow_at
@@ -198,14 +199,12 @@ class Simulation:
                 raise BlowUpError(self.frame + 1, 1, str(error)) from error
         beyond: tuple[str, ...] = ()
         if commands:
-            told, beyond = told_by(commands, world, self.frame_time, self._drives())
-            world.setup = world.setup.but(told=told)
+            world.told, beyond = told_by(commands, world, self.frame_time, self._drives())
         with _one_blas_thread(), kernel_threads():
             report = replace(
                 self._advance(world, self.frame + 1), beyond=beyond, values=self._values
             )
-        if commands:
-            world.setup = self.setup.where(world.setup)
+        world.told = NOTHING_TOLD
         moment = Snapshot(world, report.frame, report)
         lost = self.columns.lost(self.columns.values(moment))
         if lost:
