@@ -66,7 +66,7 @@ def step_bodies(world: World, dt: float, command: JointCommand) -> StepReport:
         force = generalised(pose, np.append(wind, np.zeros(pose.vertices.size)))
         known = {"centre": pose.mass_centre, "wind_wrench": wind}
     driven = equations(world, before, force, command, dt)
-    solved = solve_bodies(driven, command.torque_limit, 6 * model.nbody)
+    solved = solve_bodies(driven, command.torque_limit)
     world.solid.v[:] = solved.v
     world.advance_clock(dt)
     return report_bodies(world, dt, solved, known)

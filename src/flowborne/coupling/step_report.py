@@ -13,7 +13,7 @@ from flowborne.coupling.half_pressure import HalfPressure
 from flowborne.coupling.mouths import Jet, jet_wrench
 from flowborne.coupling.operators import buoyancy_wrench
 from flowborne.coupling.report import FIELDS, Outcome, StepReport
-from flowborne.coupling.solve import Solved
+from flowborne.coupling.solve import Solved, SolvedFlow
 from flowborne.coupling.stream import winds_on
 from flowborne.coupling.world import World
 from flowborne.fluid.control_volumes import fluid_momentum, momentum_change
@@ -92,7 +92,7 @@ def report_coupled(
     mass: Faces,
     half: HalfPressure,
     advected: AdvectionResult,
-    solved: Solved,
+    solved: SolvedFlow,
     known: dict[str, Any],
 ) -> StepReport:
     """Of a step with a fluid: forces on the bodies, the budget of momentum, how well the solve did.
@@ -100,20 +100,19 @@ def report_coupled(
     mass   Faces, of the fluid at the end of the step, kg
     known  what the report says of forces known before the solve, and of dyes
     """
-    flesh, projected = world.setup.solid.flesh, solved.projected
-    assert projected is not None
+    flesh = world.setup.solid.flesh
     known |= momentum_budget(world, mass, half, advected, solved) | {
         "centre": pose.mass_centre,
-        "pressure_wrench": on_bodies(pose, flesh, (projected.impulse + half.impulse) / dt),
+        "pressure_wrench": on_bodies(pose, flesh, (solved.impulse + half.impulse) / dt),
         "viscous_wrench": on_bodies(pose, flesh, solved.viscous_impulse / dt),
         "added_mass_wrench": on_bodies(pose, flesh, solved.added_mass / dt),
-        "solver_iterations": projected.iterations,
-        "residual": projected.residual,
-        "divergence": projected.divergence,
-        "fastest": projected.fastest,
+        "solver_iterations": solved.iterations,
+        "residual": solved.residual,
+        "divergence": solved.divergence,
+        "fastest": solved.fastest,
     }
     done = report_bodies(world, dt, solved, known)
-    finite = np.isfinite(projected.pressure).all()
+    finite = np.isfinite(solved.pressure).all()
     return done if finite else replace(done, outcome=Outcome.NOT_FINITE)
 
 
@@ -128,24 +127,21 @@ def on_bodies(pose: Kinematics, flesh: Flesh | None, push: Array) -> Array:
 
 
 def momentum_budget(
-    world: World, mass: Faces, half: HalfPressure, advected: AdvectionResult, solved: Solved
+    world: World, mass: Faces, half: HalfPressure, advected: AdvectionResult, solved: SolvedFlow
 ) -> dict[str, Any]:
     """What the report says of the fluid's momentum, with the masses `mass` of the faces at the end
     of the step."""
     fluid, _ = world.flow()
-    projected, before = solved.projected, solved.before_pressure
-    assert projected is not None
-    assert before is not None
-    grid, boundaries = fluid.grid, fluid.boundaries
+    before, grid, boundaries = solved.before_pressure, fluid.grid, fluid.boundaries
     first = 6 * world.setup.solid.nbody
     pressed = fluid_momentum(before, mass, grid, boundaries)
-    taken, moved = momentum_change(before, projected.velocity, mass, grid, boundaries)
-    after = fluid_momentum(projected.velocity, mass, grid, boundaries)
-    pushes = linear(projected.impulse, first)
+    taken, moved = momentum_change(before, solved.velocity, mass, grid, boundaries)
+    after = fluid_momentum(solved.velocity, mass, grid, boundaries)
+    pushes = linear(solved.impulse, first)
     exchanged = pushes.sum(axis=0)
     scale = float(np.abs(pushes).sum()) + moved
-    missing = float(np.abs(exchanged + taken - projected.sides).max())
-    sides = projected.sides + half.sides
+    missing = float(np.abs(exchanged + taken - solved.sides).max())
+    sides = solved.sides + half.sides
     exchanged += linear(half.impulse, first).sum(axis=0)
     forces = pressed - fluid_momentum(advected.velocity, mass, grid, boundaries)
     given = advected.crossed + advected.expelled + advected.stopped + forces + sides - exchanged

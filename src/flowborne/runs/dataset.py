@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 from xarray.backends import BackendArray
 from xarray.core import indexing
 
-from flowborne.fluid.grid import Grid
-from flowborne.runs.history import HistoryArray
-from flowborne.runs.states import StateArray
+from flowborne.fluid.grid import Array, Grid
+from flowborne.runs.states import Quantity, StateArray
 
 
 class LazyStates(BackendArray):
@@ -38,7 +37,7 @@ class LazyStates(BackendArray):
 def dataset_of(
     arrays: Mapping[str, StateArray],
     frames: Sequence[int],
-    history: Mapping[str, HistoryArray],
+    history: Mapping[str, tuple[Quantity, Array]],
     rows: NDArray[np.int64],
     bodies: Sequence[str],
     joints: Sequence[str],
@@ -48,14 +47,14 @@ def dataset_of(
     """The arrays of a run, see `OpenRun.dataset`.
 
     frames   frame number of each state
-    history  name -> quantity of the history
+    history  name -> quantity of the history, and its values
     rows     (k,) frame of each of its rows
     bodies   names of the bodies
     joints   names of the joints
     cells    coordinates of cells and faces; none without a fluid
     about    attributes of the data set
     """
-    variables = {name: _of_history(array, rows, frames) for name, array in history.items()}
+    variables = {name: _of_history(*array, rows, frames) for name, array in history.items()}
     for name, array in arrays.items():
         if name != "time":
             data = indexing.LazilyIndexedArray(LazyStates(array))
@@ -73,15 +72,15 @@ def dataset_of(
 
 
 def _of_history(
-    array: HistoryArray, rows: NDArray[np.int64], frames: Sequence[int]
+    quantity: Quantity, known: Array, rows: NDArray[np.int64], frames: Sequence[int]
 ) -> xarray.Variable:
     """A quantity of the history at the times of the states, nan for states without a row."""
-    values = np.full((len(frames), *array.values.shape[1:]), np.nan)
+    values = np.full((len(frames), *known.shape[1:]), np.nan)
     _, here, there = np.intersect1d(np.array(frames), rows, return_indices=True)
-    values[here] = array.values[there]
-    about = {"units": array.unit, "long_name": array.meaning}
+    values[here] = known[there]
+    about = {"units": quantity.unit, "long_name": quantity.meaning}
     return xarray.Variable(
-        ("time", *array.dimensions), values, {key: text for key, text in about.items() if text}
+        ("time", *quantity.dimensions), values, {key: text for key, text in about.items() if text}
     )
 
 

@@ -15,6 +15,7 @@ import numpy as np
 from flowborne.base.atomic import write_text
 from flowborne.base.given import MOST_BYTES, check_file
 from flowborne.fluid.grid import Array
+from flowborne.runs.states import Quantity
 
 UNITS = {
     "s": "s",
@@ -237,21 +238,6 @@ def _text(value: float) -> str:
     return str(value) if isinstance(value, int) else repr(float(value))
 
 
-class HistoryArray(NamedTuple):
-    """A quantity of the history, for all bodies or joints that have it.
-
-    dimensions  of one frame: (), ("joint",), ("body", "axis"), ("joint", "axis") or ("axis",)
-    values      (frames, ...), nan for a body or joint without such a column
-    unit        "1" without one, "" when it depends on an objective
-    meaning     in a few words, "" when the name says it
-    """
-
-    dimensions: tuple[str, ...]
-    values: Array
-    unit: str
-    meaning: str
-
-
 def unit_of(column: str) -> str:
     """Unit of a column of the history; "1" without one, "" when it depends on an objective."""
     if column.startswith(("objective", "measured_")):
@@ -265,8 +251,9 @@ def unit_of(column: str) -> str:
 
 def history_arrays(
     history: Mapping[str, Array], bodies: tuple[str, ...], joints: tuple[str, ...]
-) -> dict[str, HistoryArray]:
-    """Name -> quantity of a history, without its frame, its time and the poses of bodies.
+) -> dict[str, tuple[Quantity, Array]]:
+    """Name -> quantity of a history and its values (frames, ...), nan for a body or joint without
+    such a column; without the frame, the time and the poses of bodies.
 
     Quantities of joints are called `torque`, `power` and so on, or `torque_xyz` with three
     components; those of bodies `body_force` and so on. Others keep their column name without the
@@ -276,7 +263,7 @@ def history_arrays(
     bodies   names in the order of the dimension `body`
     joints   names in the order of the dimension `joint`
     """
-    found: dict[str, HistoryArray] = {}
+    found: dict[str, tuple[Quantity, Array]] = {}
     entries = {"joint": joints, "body": bodies, "axis": tuple("xyz")}
     for column, values in history.items():
         place = _place(column, bodies, joints)
@@ -285,9 +272,9 @@ def history_arrays(
         name, meaning, at = place
         if name not in found:
             empty = np.full((len(values), *(len(entries[key]) for key in at)), np.nan)
-            found[name] = HistoryArray(tuple(at), empty, unit_of(column), meaning)
+            found[name] = Quantity(tuple(at), unit_of(column), meaning), empty
         index = tuple(entries[key].index(entry) for key, entry in at.items())
-        np.moveaxis(found[name].values, 0, -1)[index] = values
+        np.moveaxis(found[name][1], 0, -1)[index] = values
     return found
 
 

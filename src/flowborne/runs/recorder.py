@@ -27,21 +27,8 @@ BYTES_PER_MEMBER = 300
 class Recorder:
     """Writes states/NNNNNN.npz of a run.
 
-    Each file contains, in single precision except for the first two,
-
-      time                                       s
-      grid_origin (3,)                           m, lower corner of the grid, which may move
-      q (nq,), v (nv,)                           generalised coordinates
-      geom_position (ng, 3), geom_rotation (ng, 3, 3), body_position (nb, 3), body_rotation
-      fluid_force (nb, 3)                        N, force of fluid and winds on each body: mean over
-                                                 the frame, without the added-mass part
-      fluid_centre (nb, 3)                       m, its point in pictures: the centroid of the body
-                                                 and the flesh that it carries
-      flesh_vertices (k, 3)                      m, the vertices on the skin of flesh
-      velocity_x, velocity_y, velocity_z         m/s on the faces (no z in a slab)
-      pressure                                   Pa in the cells
-      scalar_<name>                              in the cells
-      open                                       part of each cell outside all bodies
+    Each file contains the arrays of `states.QUANTITIES` and the dyes, in single precision except
+    for time and grid_origin: those of the fluid where there is one, no velocity_z in a slab.
 
     Files are written atomically. `sync` flushes all of them to the disc together: one by one, this
     would take longer than writing them.
