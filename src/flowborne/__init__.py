@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from flowborne.control.measurement import Measurement
     from flowborne.control.trial import Hypothesis, Velocities
     from flowborne.coupling.report import Outcome, StepReport
-    from flowborne.coupling.sensed import BodyState, JointState
     from flowborne.coupling.step import step
     from flowborne.coupling.stream import FlowState
     from flowborne.coupling.world import Fluid, Setup, World
@@ -41,6 +40,7 @@ if TYPE_CHECKING:
     from flowborne.sim.running import RunInterrupted, RunResult, run
     from flowborne.sim.simulation import BlowUpError, Simulation
     from flowborne.solids.model import SolidModel
+    from flowborne.solids.sensed import BodyState, JointState
     from flowborne.solids.state import SolidState
     from flowborne.solids.tissue.growth import Tissue
     from flowborne.studies.batch_page import Batch, ClipRun
@@ -119,7 +119,7 @@ _PLACES = {
     "Array": "flowborne.fluid.grid",
     "Batch": "flowborne.studies.batch_page",
     "BlowUpError": "flowborne.sim.simulation",
-    "BodyState": "flowborne.coupling.sensed",
+    "BodyState": "flowborne.solids.sensed",
     "Control": "flowborne.control.commands",
     "ClipRun": "flowborne.studies.batch_page",
     "Controller": "flowborne.control.controller",
@@ -133,7 +133,7 @@ _PLACES = {
     "Grid": "flowborne.fluid.grid",
     "Hypothesis": "flowborne.control.trial",
     "Imported": "flowborne.characters.folder",
-    "JointState": "flowborne.coupling.sensed",
+    "JointState": "flowborne.solids.sensed",
     "Measurement": "flowborne.control.measurement",
     "OpenRun": "flowborne.runs.open_run",
     "Outcome": "flowborne.coupling.report",

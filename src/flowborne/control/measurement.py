@@ -10,10 +10,10 @@ import numpy as np
 
 from flowborne.control import creature
 from flowborne.coupling.report import StepReport
-from flowborne.coupling.sensed import BodyState, JointState, Sensed
 from flowborne.kernels.arrays import Array, Integers
 from flowborne.solids.dynamics import Kinematics, kinematics
 from flowborne.solids.momentum import momentum
+from flowborne.solids.sensed import BodyState, JointState, Sensed
 
 if TYPE_CHECKING:
     from flowborne.coupling.world import World

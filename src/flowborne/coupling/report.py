@@ -8,15 +8,17 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from enum import Enum
+from functools import partial
+from operator import itemgetter
 from time import perf_counter
 from typing import Annotated, Any, NamedTuple, get_type_hints
 
 import numpy as np
 
 from flowborne.base.errors import BreakdownError, PartError, WorkerError
-from flowborne.coupling.sensed import Sensed
 from flowborne.coupling.world import World
 from flowborne.kernels.arrays import Array, Integers
+from flowborne.solids.sensed import Sensed
 
 BREAKDOWNS = ArithmeticError, np.linalg.LinAlgError, BreakdownError, PartError, WorkerError
 """Errors with which a step may end; their text says what happened."""
@@ -36,16 +38,9 @@ class Outcome(Enum):
     ADVECTION_NOT_FINITE = "a velocity of the fluid is not a finite number after advection"
 
 
-def last(values: Sequence[Any]) -> Any:
-    return values[-1]
-
-
-def mean(values: Sequence[Array]) -> Array:
-    return np.asarray(np.mean(values, axis=0))
-
-
-def total(values: Sequence[Array]) -> Array:
-    return np.asarray(np.sum(values, axis=0))
+last = itemgetter(-1)
+mean = partial(np.mean, axis=0)
+total = partial(np.sum, axis=0)
 
 
 def union(values: Sequence[Integers]) -> Integers:
@@ -74,8 +69,7 @@ Impulse = Annotated[Array, Joined(total, total, "Ns", "xyz")]
 Worst = Annotated[float, Joined(max, max)]
 
 
-def no_momentum() -> Array:
-    return np.zeros(3)
+no_momentum = partial(np.zeros, 3)
 
 
 def no_dofs() -> Integers:
@@ -189,16 +183,9 @@ class StepReport:
 
     def sensed(self, world: World) -> Sensed:
         """What can be sensed of the bodies and joints of `world` after the step."""
-        return Sensed(
-            world.setup.solid,
-            world.solid.q,
-            self.velocity,
-            self.acceleration,
-            self.dt,
-            self.actuator,
-            self.central_wrench(),
-            self.central_added_mass(),
-        )
+        state = self.velocity, self.acceleration, self.dt, self.actuator
+        wrenches = self.central_wrench(), self.central_added_mass()
+        return Sensed(world.setup.solid, world.solid.q, *state, *wrenches)
 
 
 def about(wrench: Array, points: Array) -> Array:

@@ -121,5 +121,5 @@ def step_coupled(world: World, dt: float, command: JointCommand) -> StepReport:
     solved = solve_together(world, velocity, mass, driven, pose, cut, jets, limit)  # 6
     store_state(world, half, advected, dyed, solved, cut, pose)  # 7
     state.wake, state.sea = far.wake, far.velocity
-    known["dye_budget_error"] = dyed.error
+    known |= {"dye_budget_error": dyed.error}
     return report_coupled(world, dt, pose, mass, half, driven_sides, solved, known)

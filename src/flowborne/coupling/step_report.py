@@ -23,14 +23,13 @@ from flowborne.solids.flesh import Flesh
 from flowborne.solids.model import SolidModel
 from flowborne.solids.momentum import halfway_momentum
 
+WRENCHES = [name for name in FIELDS if name.endswith("_wrench")]
+
 
 def fluid_forces(model: SolidModel, value: float) -> dict[str, Any]:
     """What a report says of forces on bodies where all are `value`: 0, or nan if not known."""
     wrench = np.full((model.nbody, 6), value)
     return dict.fromkeys(WRENCHES, wrench) | {"centre": wrench[:, :3]}
-
-
-WRENCHES = [name for name in FIELDS if name.endswith("_wrench")]
 
 
 def report_failed(model: SolidModel, dt: float, outcome: Outcome) -> StepReport:

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from flowborne.base.array_file import read_arrays
 from flowborne.base.atomic import write_atomically
-from flowborne.coupling.sensed import Sensed
 from flowborne.coupling.world import Setup, World
 from flowborne.fluid.state import under
+from flowborne.solids.sensed import Sensed
 
 SENSED = "sensed/"
 """Beginning of the names of arrays that say what bodies and joints felt."""

@@ -56,17 +56,8 @@ class Recorder:
 
     def bytes_per_frame(self, world: World) -> int:
         """Approximate size of a state file."""
-        solid = world.setup.solid
-        numbers, members = 18 * solid.nbody + 12 * solid.ngeom + solid.nq + solid.nv, 9
-        if solid.flesh is not None:
-            numbers += 3 * len(on_skin(solid.flesh))
-            members += 1
-        if world.fluid is not None and world.setup.fluid is not None:
-            moving = [world.fluid.velocity[axis] for axis in world.setup.fluid.grid.axes]
-            kept = [*moving, *world.fluid.scalars.values()]
-            numbers += sum(values.size for values in kept) + 2 * world.fluid.pressure.size
-            members += len(kept) + 2
-        return 4 * numbers + BYTES_PER_MEMBER * members
+        arrays = self.arrays(world, None).values()
+        return sum(values.nbytes + BYTES_PER_MEMBER for values in arrays)
 
     def arrays(self, world: World, force: Array | None) -> dict[str, NDArray[Any]]:
         """The arrays of a state file for `world`."""

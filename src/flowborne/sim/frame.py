@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from flowborne.coupling.report import StepReport
-from flowborne.coupling.sensed import Sensed
 from flowborne.coupling.world import World
 from flowborne.kernels.arrays import Array
+from flowborne.solids.sensed import Sensed
 
 PARTS = ("advection", "viscosity", "projection", "geometry", "solids", "control")
 """Where the time of a frame goes."""

@@ -17,7 +17,6 @@ from flowborne.base.errors import PartError, SceneError, described
 from flowborne.control.commands import Commands, Drives, drives_of, told_by
 from flowborne.coupling.motion import NOTHING_TOLD
 from flowborne.coupling.report import BREAKDOWNS, Outcome, StepReport
-from flowborne.coupling.sensed import BodyState, JointState
 from flowborne.coupling.stream import FlowState, flow_at
 from flowborne.coupling.world import Setup, World
 from flowborne.fluid.boundary import SIDES
@@ -29,6 +28,7 @@ from flowborne.sim.columns import Columns
 from flowborne.sim.frame import PARTS, FrameReport, Snapshot
 from flowborne.solids.flesh import inversion
 from flowborne.solids.model import FREE, SLIDE
+from flowborne.solids.sensed import BodyState, JointState
 from flowborne.solids.surfaces import geom_boxes
 
 if TYPE_CHECKING:
