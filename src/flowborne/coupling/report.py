@@ -80,9 +80,9 @@ def no_dofs() -> Integers:
 class StepReport:
     """What `step` did.
 
-    The budget of linear momentum, N s, each (3,), angular parts about the origin, has an error, as
-    has the exchange of impulse with the bodies, relative to the impulses given to bodies and faces,
-    added up in size. Columns of the history have the same names, with the unit.
+    Momenta and impulses are linear, (3,), N s. Errors of their exchange and of the budget are
+    relative to the impulses given to bodies and faces, added up in size. The history has columns
+    of the same names, with a suffix for the unit, of all from `work` to `fastest`.
 
     dt               s
     velocity         (nv,) at the end of the step: v is that half a step before, then half a step
@@ -112,9 +112,10 @@ class StepReport:
     momentum_boundary
                      impulse of the sides of the domain on the fluid: their pressure, and what they
                      stop of the flow that reaches them
-    momentum_crossed that the flow itself carried in through the sides
-    momentum_forces  what body forces, driven regions and friction at walls and bodies gave to it
-    momentum_jet     that came into the fluid through mouths and sources
+    momentum_crossed carried in by the flow itself through the sides
+    momentum_forces  given to the fluid by body forces, driven regions and friction at walls and
+                     bodies
+    momentum_jet     brought into the fluid by mouths and sources
     expelled         volume that mouths expelled, less what they took in, m^3
     momentum_exchange_error
                      |impulse given to the bodies + impulse taken from the fluid and the walls|

@@ -94,5 +94,4 @@ class Snapshot:
         """Bodies and joints by their names."""
         if self.report is not None:
             return self.report.sensed(self.world)
-        solid = self.world.solid
-        return self.kept or Sensed.before_steps(self.world.setup.solid, solid.q)
+        return self.kept or Sensed.before_steps(self.world.setup.solid, self.world.solid.q)

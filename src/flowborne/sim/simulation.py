@@ -201,9 +201,7 @@ class Simulation:
         if commands:
             world.told, beyond = told_by(commands, world, self.frame_time, self._drives())
         with _one_blas_thread(), kernel_threads():
-            report = replace(
-                self._advance(world, self.frame + 1), beyond=beyond, values=self._values
-            )
+            report = self._advance(world, self.frame + 1, beyond)
         world.told = NOTHING_TOLD
         moment = Snapshot(world, report.frame, report)
         lost = self.columns.lost(self.columns.values(moment))
@@ -308,8 +306,8 @@ class Simulation:
             ) from error
         self._started = True
 
-    def _advance(self, world: World, frame: int) -> FrameReport:
-        """Advance `world` by a frame, in place."""
+    def _advance(self, world: World, frame: int, beyond: tuple[str, ...]) -> FrameReport:
+        """Advance `world` by a frame, in place; `beyond` as in its report."""
         started = perf_counter()
         controller, dt = self.controller, self.frame_time / self.steps_per_frame
         end = world.time + self.frame_time
@@ -354,6 +352,8 @@ class Simulation:
             targets=targets,
             decided=decided,
             seconds=seconds,
+            beyond=beyond,
+            values=self._values,
         )
 
 
