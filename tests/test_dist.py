@@ -56,14 +56,18 @@ def validation(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
 def fresh(archives: tuple[Path, Path], tmp_path_factory: pytest.TempPathFactory) -> str:
     """Python of an environment that has the wheel, and the libraries of this one but no flowborne.
 
-    What is installed here in editable form is not found from there: a path in a .pth file brings
-    packages, and no .pth files of its own.
+    What is installed here in editable form is not found from there: .pth files and descriptions of
+    flowborne stay behind.
     """
     folder = tmp_path_factory.mktemp("fresh")
     python = environment(sys.executable, folder)
     (packages,) = folder.rglob("site-packages")
-    here = [path for path in sys.path if path.endswith("site-packages")]
-    (packages / "libraries.pth").write_text("\n".join(here))
+    libraries = tmp_path_factory.mktemp("libraries")
+    for here in (Path(path) for path in sys.path if path.endswith("site-packages")):
+        for found in here.iterdir():
+            if "flowborne" not in found.name:
+                (libraries / found.name).symlink_to(found)
+    (packages / "libraries.pth").write_text(f"{libraries}\n")
     install(python, archives[1], "--no-deps", "--no-index", "--no-compile")
     return python
 

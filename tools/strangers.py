@@ -27,7 +27,7 @@ import mujoco
 import numpy as np
 import tomli_w
 
-from flowborne.solids.mjcf import Given, compiled
+from flowborne.solids.mjcf import Given, bones_of
 from markdown_text import plain, table
 from marked import with_part
 
@@ -152,7 +152,7 @@ def scene_of(path: Path, edits: dict[str, Any]) -> dict[str, Any]:
     low, high = np.zeros(3), np.ones(3)
     with contextlib.suppress(ValueError):
         given = Given(hulls="solids.mend" in edits)
-        low, high = extent(compiled(path, False, (0.0, 0.0, 0.0), given), "domain" in edits)
+        low, high = extent(bones_of(path, False, (0.0, 0.0, 0.0), given)[1], "domain" in edits)
     margin = MARGIN * float((high - low).max()) * (2.0 if "room" in edits else 1.0)
     return {
         "gravity": [0.0, 0.0, -9.81],

@@ -39,9 +39,8 @@ if TYPE_CHECKING:
     from flowborne.sim.frame import FrameReport, Snapshot
     from flowborne.sim.running import RunInterrupted, RunResult, run
     from flowborne.sim.simulation import BlowUpError, Simulation
-    from flowborne.solids.model import SolidModel
+    from flowborne.solids.model import SolidModel, SolidState
     from flowborne.solids.sensed import BodyState, JointState
-    from flowborne.solids.state import SolidState
     from flowborne.solids.tissue.growth import Tissue
     from flowborne.studies.batch_page import Batch, ClipRun
     from flowborne.studies.batches import run_clips
@@ -149,7 +148,7 @@ _PLACES = {
     "Simulation": "flowborne.sim.simulation",
     "Snapshot": "flowborne.sim.frame",
     "SolidModel": "flowborne.solids.model",
-    "SolidState": "flowborne.solids.state",
+    "SolidState": "flowborne.solids.model",
     "StepReport": "flowborne.coupling.report",
     "StrengthInPhase": "flowborne.control.controller",
     "StudyResult": "flowborne.studies.result",

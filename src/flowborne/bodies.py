@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from flowborne.coupling.motion import JointCommand, Trajectory
-from flowborne.coupling.servo import Servo, ServoExact, ServoPD, TrajectoryServo
 from flowborne.motion.human.body import human_mjcf
 from flowborne.motion.human.skeleton import SIDES, standard_skeleton
 from flowborne.motion.tracks import (
@@ -19,7 +17,7 @@ from flowborne.solids.flesh import Flesh
 from flowborne.solids.flesh_dynamics import assemble_flesh, static_forces
 from flowborne.solids.flesh_solve import prescribe_flesh
 from flowborne.solids.mjcf import read_spec
-from flowborne.solids.model import SolidModel
+from flowborne.solids.model import SolidModel, SolidState
 from flowborne.solids.momentum import (
     halfway_momentum,
     kinetic_energy,
@@ -27,10 +25,17 @@ from flowborne.solids.momentum import (
     momentum,
     potential_energy,
 )
-from flowborne.solids.state import SolidState
 from flowborne.solids.tissue.growth import Tissue, add_flesh
 from flowborne.solids.tissue.mesh import FleshMesh
 from flowborne.solids.tissue.mesh_file import mesh_bytes, read_mesh
+from flowborne.solids.trajectories import (
+    JointCommand,
+    Servo,
+    ServoExact,
+    ServoPD,
+    Trajectory,
+    TrajectoryServo,
+)
 from flowborne.solids.wind import Wind, WindFaces, WindField, WindForce
 from flowborne.solvers.cholesky import symmetric_factor
 

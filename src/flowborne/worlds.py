@@ -15,13 +15,11 @@ from typing import TypedDict, Unpack
 import numpy as np
 from scipy.interpolate import RegularGridInterpolator
 
-from flowborne.coupling.cut import cut_by_bodies, volumes_of
-from flowborne.coupling.motion import JointCommand, Trajectory
+from flowborne.coupling.cut import cut_by_bodies, following, volumes_of
 from flowborne.coupling.report import Outcome, StepReport
 from flowborne.coupling.start import set_going, start
 from flowborne.coupling.step import step
 from flowborne.coupling.stream import Sampled
-from flowborne.coupling.window import following
 from flowborne.coupling.world import Fluid, Setup, World
 from flowborne.fluid.boundary import Boundaries, Source
 from flowborne.fluid.control_volumes import control_volumes, face_masses
@@ -41,6 +39,7 @@ from flowborne.fluid.transport import Transport
 from flowborne.fluid.wake import resampled
 from flowborne.solids import momentum
 from flowborne.solids.model import SolidModel
+from flowborne.solids.trajectories import JointCommand, Trajectory
 from flowborne.solids.wind import Wind
 from flowborne.solvers.pressure import PressureSolution, PressureSystem
 

@@ -70,7 +70,7 @@ class Barred:
             raise ModuleNotFoundError(name)
 sys.meta_path.insert(0, Barred())
 import flowborne
-rooms = "fluid kernels solvers shapes solids coupling control motion scenes runs files"
+rooms = "fluid kernels solvers shapes solids coupling control motion scenes runs base"
 rooms = ["flowborne." + room for room in rooms.split()] + ["flowborne_validation"]
 for room in rooms:
     package = importlib.import_module(room)

@@ -18,7 +18,6 @@ from flowborne.characters.rig import Z_UP, Action, Rig, Surface
 from flowborne.characters.source import read_source
 from flowborne.cli import main as cli
 from flowborne.formats.creature import Creature
-from flowborne.motion.bvh import read_bvh
 from flowborne.motion.clip import Clip
 from flowborne.scenes.bodies import load_model
 from flowborne.scenes.build import build
@@ -27,6 +26,7 @@ from flowborne.scenes.warn_speed import fast_bodies, steps_for_bodies
 from flowborne.solids.skins import skins_of
 from flowborne.view.run import Run
 
+from ..read_bvh import read_bvh
 from . import rigged
 
 CREATURES = Path(__file__).parents[3] / "shared" / "creatures"

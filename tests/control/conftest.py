@@ -7,10 +7,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from flowborne.coupling.motion import JointCommand
 from flowborne.coupling.report import Outcome, StepReport
 from flowborne.coupling.world import Setup, World
 from flowborne.solids.model import SolidModel
+from flowborne.solids.trajectories import JointCommand
 
 ARM = """
 <mujoco>

@@ -9,8 +9,8 @@ import pytest
 
 import flowborne as fb
 from flowborne.control.commands import Control, Position, Torque, Velocity
-from flowborne.coupling.motion import JointCommand
 from flowborne.sim.simulation import Simulation
+from flowborne.solids.trajectories import JointCommand
 
 PENDULUM = """<mujoco><worldbody>
   <body name="arm"><joint name="hinge" axis="0 0 1" range="-60 60" actuatorfrcrange="-40 40"/>

@@ -19,10 +19,9 @@ from flowborne.control.objectives import ObjectiveCallable, ObjectiveSum, Weight
 from flowborne.control.phases import PhaseIntervals
 from flowborne.control.rules import GoldenSection
 from flowborne.control.trial import Hypothesis
-from flowborne.coupling.motion import JointCommand
 from flowborne.coupling.report import StepReport
-from flowborne.coupling.servo import ServoExact, ServoPD
 from flowborne.coupling.world import World
+from flowborne.solids.trajectories import JointCommand, ServoExact, ServoPD
 
 MakeWorld = Callable[..., World]
 Step = Callable[[World, float, JointCommand | None], StepReport]

@@ -19,13 +19,12 @@ from flowborne.control.objective_kinds import (
 )
 from flowborne.control.objectives import Objective, ObjectiveSum, WeightedObjective
 from flowborne.control.trial import Hypothesis
-from flowborne.coupling.servo import ServoExact
 from flowborne.coupling.step import step
 from flowborne.coupling.world import Fluid, Setup, World
 from flowborne.fluid.grid import Grid
 from flowborne.fluid.state import FluidState
-from flowborne.solids.model import SolidModel
-from flowborne.solids.state import SolidState
+from flowborne.solids.model import SolidModel, SolidState
+from flowborne.solids.trajectories import ServoExact
 from flowborne.solids.wind import Wind, WindFaces, WindForce
 
 from ..solids.held_pose import holding

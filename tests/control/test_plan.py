@@ -21,11 +21,10 @@ from flowborne.control.phases import PhaseIntervals
 from flowborne.control.plan import Horizon, PlanCourse
 from flowborne.control.rules import QuasiNewton
 from flowborne.coupling import step as stepping
-from flowborne.coupling.motion import JointCommand
 from flowborne.coupling.report import Outcome, StepReport
-from flowborne.coupling.servo import ServoExact
 from flowborne.coupling.world import World
 from flowborne.motion.tracks import TrajectoryConstant
+from flowborne.solids.trajectories import JointCommand, ServoExact
 
 MakeWorld = Callable[..., World]
 Step = Callable[[World, float, JointCommand | None], StepReport]

@@ -18,12 +18,12 @@ from flowborne.control.objectives import ObjectiveCallable, ObjectiveSum
 from flowborne.control.phases import PhaseIntervals
 from flowborne.control.trial import Hypothesis, PoseCourse, Trial, without_scalars
 from flowborne.coupling import step as stepping
-from flowborne.coupling.motion import JointCommand
 from flowborne.coupling.report import Outcome, StepReport
 from flowborne.coupling.world import World
 from flowborne.scenes.build import build
 from flowborne.scenes.load import load_scene
 from flowborne.sim.simulation import Simulation
+from flowborne.solids.trajectories import JointCommand
 
 MakeWorld = Callable[..., World]
 Step = Callable[[World, float, JointCommand | None], StepReport]

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from flowborne import FrameReport, Grid, StepReport
-from flowborne.coupling.motion import JointCommand
 from flowborne.coupling.step import step
+from flowborne.solids.trajectories import JointCommand
 from flowborne.worlds import Boundaries, BoundaryInflow, BoundaryOpen, make_world
 from flowborne_validation.worlds import mjcf
 

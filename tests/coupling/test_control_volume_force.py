@@ -13,8 +13,8 @@ from flowborne.coupling.step import step
 from flowborne.coupling.world import World
 from flowborne.fluid import transport
 from flowborne.fluid.control_volumes import face_masses
-from flowborne.fluid.eddies import damp_eddies
 from flowborne.fluid.grid import Array, Faces, Grid
+from flowborne.fluid.transport import damp_eddies
 from flowborne.kernels import carry as kernels
 from flowborne.kernels.flux import GHOSTS
 

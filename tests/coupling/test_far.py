@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import flowborne as fb
-from flowborne.coupling.motion import JointCommand
 from flowborne.coupling.world import World
 from flowborne.fluid.grid import Grid
 from flowborne.sim.frame import Snapshot
+from flowborne.solids.trajectories import JointCommand
 from flowborne.solvers.pressure import PressureSolution, PressureSystem
 from flowborne.worlds import (
     Boundaries,

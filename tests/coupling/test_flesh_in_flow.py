@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from flowborne.coupling.cut import cut_by_bodies
-from flowborne.coupling.motion import JointCommand
 from flowborne.coupling.operators import add_flux, boundary_velocity, leak_proof, pressure_push
 from flowborne.coupling.report import Outcome
 from flowborne.coupling.step import step
@@ -21,6 +20,7 @@ from flowborne.solids.dynamics import kinematics
 from flowborne.solids.flesh import inversion
 from flowborne.solids.model import SolidModel
 from flowborne.solids.tissue.growth import Law, Tissue, add_flesh
+from flowborne.solids.trajectories import JointCommand
 from flowborne_validation.flesh_bars import bar_mesh
 
 Array = NDArray[np.float64]

@@ -11,7 +11,6 @@ import flowborne
 from flowborne import World
 from flowborne.coupling import step as steps
 from flowborne.coupling.cut import cut_by_bodies
-from flowborne.coupling.motion import JointCommand
 from flowborne.coupling.operators import generalised, pressure_push
 from flowborne.coupling.overlaps import handed_on
 from flowborne.coupling.report import Outcome
@@ -22,6 +21,7 @@ from flowborne.fluid.sides.kinds import BoundaryOpen
 from flowborne.kernels.coupling_rows import COVERED, ENCLOSED, NARROW, WIDE
 from flowborne.sim.simulation import Simulation
 from flowborne.solids.dynamics import kinematics
+from flowborne.solids.trajectories import JointCommand
 from flowborne.worlds import make_world
 from flowborne_validation.worlds import mjcf
 

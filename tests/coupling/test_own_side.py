@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import pytest
 
-from flowborne.coupling.motion import JointCommand
 from flowborne.coupling.step import step
 from flowborne.fluid.grid import Array, Grid
 from flowborne.fluid.sides.side import Place
+from flowborne.solids.trajectories import JointCommand
 from flowborne.worlds import Boundaries, Boundary, BoundaryClosed, BoundaryOpen, make_world
 
 CELLS = 16

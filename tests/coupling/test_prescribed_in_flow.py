@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from flowborne.coupling.motion import velocity_after
 from flowborne.coupling.step import step
 from flowborne.coupling.world import Fluid, Setup, World
 from flowborne.fluid.boundary import Boundaries
@@ -17,6 +16,7 @@ from flowborne.fluid.sides.kinds import BoundaryInflow, BoundaryOpen
 from flowborne.motion.tracks import Curve, TrajectoryKeyframes, TrajectorySinusoid
 from flowborne.solids.dynamics import Kinematics
 from flowborne.solids.model import SolidModel
+from flowborne.solids.trajectories import velocity_after
 
 ARM = """
 <mujoco><compiler angle="radian"/><worldbody>

@@ -8,7 +8,7 @@ import pytest
 import flowborne as fb
 from flowborne.coupling.world import World
 from flowborne.fluid.grid import Grid
-from flowborne.fluid.induced import pooled
+from flowborne.fluid.potential import pooled
 from flowborne.sim.frame import Snapshot
 from flowborne.worlds import (
     Boundaries,

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from flowborne.coupling.cut import cells_to_follow, follow
 from flowborne.coupling.step import step
-from flowborne.coupling.window import cells_to_follow, follow
 from flowborne.coupling.world import World
 from flowborne.fluid.grid import Array, Grid
 from flowborne.worlds import (

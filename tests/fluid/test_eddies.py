@@ -7,8 +7,7 @@ import pytest
 
 from flowborne import Array, Faces, Grid
 from flowborne.fluid.control_volumes import fluid_momentum, kinetic_energy
-from flowborne.fluid.eddies import damp_eddies
-from flowborne.fluid.transport import Transport
+from flowborne.fluid.transport import Transport, damp_eddies
 from flowborne.worlds import Boundaries
 from flowborne_validation.worlds import RING
 

@@ -11,8 +11,9 @@ from scipy.spatial.transform import Rotation
 
 import flowborne as fb
 from flowborne.formats.creature import Creature
-from flowborne.motion.bvh import read_bvh
 from flowborne.motion.bvh_file import load_bvh
+
+from ..read_bvh import read_bvh
 
 read_back = pytest.importorskip("read_back", exc_type=ImportError)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -119,3 +121,15 @@ def test_ones_own_takes_the_place_of_ours(water: Path, tmp_path: Path) -> None:
     finally:
         EXPORTERS._kinds[".csv"] = ours
         EXPORTERS._kinds.pop(".odd")
+
+
+def test_exporters_are_listed_without_their_libraries() -> None:
+    listing = (
+        "import sys; "
+        "sys.modules |= dict.fromkeys(['alembic3d', 'h5py', 'pxr', 'pyarrow', 'pygltflib']); "
+        "from flowborne.runs.exporters import endings; print(*endings())"
+    )
+    done = subprocess.run([sys.executable, "-c", listing], capture_output=True, text=True)
+    assert done.stdout.split() == [
+        ".abc", ".bvh", ".csv", ".glb", ".parquet", ".usd", ".usda", ".usdc", ".vdb", ".vtkhdf"
+    ], done.stderr  # fmt: skip

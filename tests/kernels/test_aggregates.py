@@ -72,7 +72,7 @@ def test_aggregates_lie_on_the_orphans_side():
 @pytest.mark.parametrize("seed", [0, 1])
 def test_marks_orphans_and_their_weights_are_what_numpy_says(shape, periodic, seed):
     system = system_of(shape, periodic, seed)
-    b, around = system.buffers, system.periodic
+    b, around = system.buffers, system.buffers.periodic
     table, marks = b.table, at_level(b.marks, b.table, 0).copy()
     w, inverse = weights_at(b.weights, table, 0), at_level(b.inverse, table, 0)
     factor = table[1, S0 : S0 + 3] // table[0, S0 : S0 + 3]

@@ -110,12 +110,12 @@ def test_regions(shape: tuple, periodic: tuple, seed: int) -> None:
         w[random.random(w.shape) < 0.4] = 0.0
         for axis in range(3):
             ends = np.moveaxis(w, axis, 0)
-            if system.periodic[axis] and w is b.finest[axis]:
+            if system.buffers.periodic[axis] and w is b.finest[axis]:
                 ends[-1] = ends[1]
     label, parent = np.empty_like(b.label), np.empty_like(b.parent)
     count = np.zeros_like(b.count)
-    regions = label_regions(b.finest, system.periodic, label, parent, count)
-    expected = label_regions_reference(b.finest, system.periodic)
+    regions = label_regions(b.finest, system.buffers.periodic, label, parent, count)
+    expected = label_regions_reference(b.finest, system.buffers.periodic)
     assert regions == expected.max() + 1 > 1
     np.testing.assert_array_equal(label, expected)
     np.testing.assert_array_equal(count[:regions], np.bincount(label[label >= 0]))

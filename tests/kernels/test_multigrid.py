@@ -92,16 +92,16 @@ def test_transfer_is_what_numpy_says(shape, periodic):
     coarse[:] = with_ghosts(
         np.random.default_rng(3).standard_normal(coarse[cells_of(coarse)].shape)
     )
-    wrap_ghosts(coarse, system.periodic)
+    wrap_ghosts(coarse, system.buffers.periodic)
     expected = interpolate_reference(x, coarse, *parts)
     found = np.full_like(x, np.nan)
     interpolate(found, x, coarse, *parts)
     inside = cells_of(x)
     np.testing.assert_allclose(found[inside], expected[inside], rtol=1e-5, atol=1e-5)
     r = with_ghosts(r[cells_of(r)])
-    wrap_ghosts(r, system.periodic)
+    wrap_ghosts(r, system.buffers.periodic)
     restrict(coarse, r, *parts)
-    expected = restrict_reference(coarse, r, *parts, system.periodic)
+    expected = restrict_reference(coarse, r, *parts, system.buffers.periodic)
     np.testing.assert_allclose(coarse[cells_of(coarse)], expected[cells_of(coarse)], atol=1e-5)
 
 
@@ -139,8 +139,8 @@ def test_cycle_is_what_numpy_says(shape, periodic):
     system = system_of(shape, periodic)
     x, b, _ = (at_level(a, system.buffers.table, 0) for a in system.buffers.cycle)
     b[:] = with_ghosts(np.random.default_rng(5).standard_normal(b[cells_of(b)].shape))
-    expected = v_cycle_reference(system.hierarchy, b)
-    v_cycle(system.hierarchy, *system.buffers.cycle)
+    expected = v_cycle_reference(system.buffers.hierarchy, b)
+    v_cycle(system.buffers.hierarchy, *system.buffers.cycle)
     np.testing.assert_allclose(x, expected, atol=1e-5 * np.abs(expected).max())
 
 
@@ -153,7 +153,7 @@ def test_cycle_is_symmetric_and_positive(shape, periodic):
     for n, cell in enumerate(active):
         b[:] = 0.0
         b.reshape(-1)[cell] = 1.0
-        v_cycle(system.hierarchy, *system.buffers.cycle)
+        v_cycle(system.buffers.hierarchy, *system.buffers.cycle)
         matrix[:, n] = x.reshape(-1)[active]
     assert np.abs(matrix - matrix.T).max() <= 1e-5 * np.abs(matrix).max()
     assert np.linalg.eigvalsh(0.5 * (matrix + matrix.T)).min() > 0.0

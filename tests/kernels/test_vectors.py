@@ -7,16 +7,7 @@ import pytest
 
 from flowborne.kernels import jit
 from flowborne.kernels.jit import kernel_threads
-from flowborne.kernels.vectors import (
-    descend,
-    dot,
-    largest,
-    load_cells,
-    scaled,
-    scaled_cells,
-    true_residual,
-    turn,
-)
+from flowborne.kernels.vectors import descend, dot, largest, load_cells, scaled, true_residual, turn
 
 from .padded import cells_of
 
@@ -48,11 +39,7 @@ def test_copies(shape: tuple[int, int, int]) -> None:
     target = np.empty(shape, np.float32)
     scaled(source, target, 0.3)
     np.testing.assert_array_equal(target, (0.3 * source).astype(np.float32))
-    expected, inside = left.copy(), cells_of(left)
-    expected[inside] = 0.3 * source[inside]
-    scaled_cells(source, left, 0.3)
-    np.testing.assert_array_equal(left, expected)
-    diagonal = np.maximum(source, 0.0)
+    inside, diagonal = cells_of(left), np.maximum(source, 0.0)
     expected = np.zeros(shape)
     expected[inside] = np.where(diagonal[inside] > 0.0, left[inside], 0.0)
     load_cells(target := np.ones(shape), np.ascontiguousarray(left[inside]), diagonal)

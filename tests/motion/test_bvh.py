@@ -11,9 +11,10 @@ from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from flowborne.base.errors import SceneError
-from flowborne.motion.bvh import TO_WORLD, read_bvh
+from flowborne.motion.bvh import TO_WORLD
 from flowborne.motion.bvh_file import load_bvh
 
+from ..read_bvh import read_bvh
 from .bvh_texts import CHAIN, Written, written
 
 MOCAP = Path(__file__).parents[3] / "shared" / "mocap"

@@ -11,11 +11,12 @@ from numpy.testing import assert_allclose
 
 from flowborne.base.errors import SceneError
 from flowborne.motion import bvh
-from flowborne.motion.bvh import read_bvh, write_bvh, write_clip
+from flowborne.motion.bvh import write_bvh, write_clip
 from flowborne.motion.bvh_file import load_bvh
 from flowborne.motion.clip import Clip
 from flowborne.motion.quaternions import about, angle, inverse, product
 
+from ..read_bvh import read_bvh
 from .bvh_texts import CHAIN, Written, written
 
 MOCAP = Path(__file__).parents[3] / "shared" / "mocap"

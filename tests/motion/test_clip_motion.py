@@ -15,13 +15,13 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from flowborne.base.errors import SceneError
-from flowborne.coupling.motion import Trajectory
-from flowborne.motion.bvh import read_bvh
 from flowborne.motion.clip_following import Passage, trajectory_of_clip
 from flowborne.motion.clip_motion import MAX_CACHED_TIMES, TrajectoryClip
 from flowborne.motion.quaternions import about, angle, inverse, product
 from flowborne.solids.model import SolidModel
+from flowborne.solids.trajectories import Trajectory
 
+from ..read_bvh import read_bvh
 from .clip_models import BODIES, MAPPING, NAMES, REST, circling, model, wandering
 
 MOCAP = Path(__file__).parents[3] / "shared" / "mocap"

@@ -10,7 +10,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from flowborne.coupling.motion import Trajectory
 from flowborne.motion.formula import Formula
 from flowborne.motion.tracks import (
     Curve,
@@ -19,6 +18,7 @@ from flowborne.motion.tracks import (
     TrajectoryKeyframes,
     TrajectorySinusoid,
 )
+from flowborne.solids.trajectories import Trajectory
 
 DOF = np.array([3])
 STEP = 1e-6

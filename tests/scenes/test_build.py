@@ -18,7 +18,6 @@ from flowborne.control.objective_kinds import ObjectivePressureDrag
 from flowborne.control.objectives import ObjectiveCallable
 from flowborne.control.phases import PhaseIntervals, PhaseTrack
 from flowborne.control.rules import GoldenSection
-from flowborne.coupling.servo import ServoExact, ServoPD, TrajectoryServo
 from flowborne.coupling.stream import WindStream
 from flowborne.fluid.sides.kinds import BoundaryInflow, BoundaryNoSlip
 from flowborne.motion.inflow import FactorSteady
@@ -26,6 +25,7 @@ from flowborne.scenes.build import Built, build
 from flowborne.scenes.load import load_scene
 from flowborne.scenes.wind import Gusts
 from flowborne.sim.simulation import Simulation
+from flowborne.solids.trajectories import ServoExact, ServoPD, TrajectoryServo
 from flowborne.solids.wind import WindFaces, WindForce
 
 Write = Callable[..., Path]

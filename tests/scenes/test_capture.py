@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flowborne.motion.bvh import TO_WORLD, read_bvh, write_clip
+from flowborne.motion.bvh import TO_WORLD, write_clip
 from flowborne.motion.human.gait import gait_clip
 from flowborne.motion.human.skeleton import standard_skeleton
 from flowborne.motion.quaternions import product
@@ -22,6 +22,7 @@ from flowborne.scenes.save import HUMAN_FILE, scene_files
 from flowborne.scenes.warn import lying
 from flowborne.sim.simulation import Simulation
 
+from ..read_bvh import read_bvh
 from .saved import save_scene
 
 Write = Callable[..., Path]

@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flowborne.coupling.servo import ServoPD, TrajectoryServo
 from flowborne.coupling.world import World
 from flowborne.scenes.build import build
 from flowborne.scenes.creature import creature_of
 from flowborne.scenes.load import check_scene, load_scene
 from flowborne.scenes.notes import notes_of
 from flowborne.scenes.warn import warnings_of
+from flowborne.solids.trajectories import ServoPD, TrajectoryServo
 
 MODEL = """<mujoco>
 <option timestep="0.004" cone="elliptic" density="1000"><flag gravity="disable"/></option>

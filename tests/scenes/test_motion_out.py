@@ -11,7 +11,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from flowborne.base.errors import SceneError
-from flowborne.motion.bvh import TO_WORLD, read_bvh, write_clip
+from flowborne.motion.bvh import TO_WORLD, write_clip
 from flowborne.motion.human.gait import gait_clip
 from flowborne.motion.human.skeleton import standard_skeleton
 from flowborne.motion.quaternions import angle, inverse, product
@@ -21,6 +21,7 @@ from flowborne.scenes.load import load_scene
 from flowborne.scenes.motion_out import export_bvh
 from flowborne.sim.running import run
 
+from ..read_bvh import read_bvh
 from .plain_bvh import plain
 from .rigs import Way, rig
 

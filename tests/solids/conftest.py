@@ -9,9 +9,8 @@ import pytest
 from numpy.typing import NDArray
 
 from flowborne.solids.dynamics import assemble
-from flowborne.solids.model import SolidModel
+from flowborne.solids.model import SolidModel, SolidState
 from flowborne.solids.prescribed import PrescribedSystem, prescribe
-from flowborne.solids.state import SolidState
 
 Array = NDArray[np.float64]
 

@@ -6,9 +6,8 @@ import numpy as np
 
 from flowborne.kernels.arrays import Array, Integers
 from flowborne.solids.dynamics import assemble
-from flowborne.solids.model import SolidModel
+from flowborne.solids.model import SolidModel, SolidState
 from flowborne.solids.prescribed import prescribe
-from flowborne.solids.state import SolidState
 
 
 def holding(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from flowborne.solids.displacing import BY_RULE, Displace
-from flowborne.solids.mjcf import Given, compiled
+from flowborne.solids.mjcf import Given, bones_of
 from flowborne.solids.model import SolidModel
 
 # a tetrahedron, and one without its last face
@@ -25,7 +25,7 @@ FIN = "<geom name='fin' size='.1' contype='0' conaffinity='0'/>"
 def displacing(geoms: str, displace: Displace = BY_RULE) -> list[str]:
     """Names of the geoms that displace, of one body that floats above a floor with a rock."""
     xml = f"<mujoco>{DEFAULTS}{MESHES}<worldbody>{WORLD}{BODY}{geoms}</body></worldbody></mujoco>"
-    mj = compiled(xml, False, (0, 0, 0), Given(displace=displace))
+    mj = bones_of(xml, False, (0, 0, 0), Given(displace=displace))[1]
     return list(SolidModel(mj, False).geom_names)
 
 

@@ -13,9 +13,8 @@ import pytest
 
 from flowborne.solids.constraints import ACTIVE, FRICTION, OFF, PUSHED_UP, Rows
 from flowborne.solids.dynamics import FULL_NEWTON_STEPS, SolidSystem, assemble, kinematics
-from flowborne.solids.model import SolidModel
+from flowborne.solids.model import SolidModel, SolidState
 from flowborne.solids.momentum import halfway_momentum, kinetic_energy, momentum, potential_energy
-from flowborne.solids.state import SolidState
 
 SPRINGS = """<mujoco><worldbody><body><joint axis="0 1 0" damping=".3"/>
 <geom type="capsule" fromto="0 0 0 1 0 0" size=".1"/>

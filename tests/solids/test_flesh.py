@@ -16,9 +16,8 @@ from flowborne.solids.elements import surface_of
 from flowborne.solids.flesh import Flesh, inversion
 from flowborne.solids.flesh_dynamics import assemble_flesh, sparse_mass, static_forces
 from flowborne.solids.flesh_solve import DAMPED_SHARE, DAMPING_ORDER, prescribe_flesh
-from flowborne.solids.model import SolidModel
+from flowborne.solids.model import SolidModel, SolidState
 from flowborne.solids.scratch import scratch
-from flowborne.solids.state import SolidState
 from flowborne.solids.tissue.growth import Grown, Law, Tissue, add_flesh
 from flowborne_validation.flag_in_channel import flag_of, flag_tissue
 from flowborne_validation.flesh_bars import bar_mesh, flat_mesh

@@ -6,9 +6,8 @@ import numpy as np
 
 from flowborne.solids.dynamics import kinematics
 from flowborne.solids.following import outboard_dofs, rigidify
-from flowborne.solids.model import SolidModel
+from flowborne.solids.model import SolidModel, SolidState
 from flowborne.solids.momentum import kinetic_energy, momentum
-from flowborne.solids.state import SolidState
 
 TREE = SolidModel.from_string("""<mujoco><worldbody><body><freejoint/><geom size=".2"/>
 <body pos=".3 0 0"><joint name="a" axis="0 1 0"/><geom type="box" size=".3 .1 .1" pos=".3 0 0"/>

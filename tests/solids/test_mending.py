@@ -13,7 +13,7 @@ from flowborne.shapes.closing import is_closed
 from flowborne.solids import mjcf
 from flowborne.solids.geoms import mesh_of
 from flowborne.solids.mending import joined_pairs, mended_meshes
-from flowborne.solids.mjcf import Given, compiled
+from flowborne.solids.mjcf import Given, bones_of
 from flowborne.solids.model import SolidModel
 
 BALL = trimesh.creation.icosphere(4, 0.1)
@@ -78,7 +78,7 @@ def test_a_mesh_that_two_bodies_have_is_mended_once(tmp_path: Path) -> None:
     start, stop = text.index("<body"), text.index("</worldbody>")
     second = text[start:stop].replace('name="b0" pos="0', 'name="b1" pos="1')
     path.write_text(text[:stop] + second + text[stop:])
-    mj = mjcf.compiled(path, False, (0.0, 0.0, 0.0))
+    mj = mjcf.bones_of(path, False, (0.0, 0.0, 0.0))[1]
     assert mended_meshes(mj) == "b0 (3 open edges) closed"
     assert len(set(mj.geom_dataid)) == 1
 
@@ -93,7 +93,7 @@ HINGE, FREE = '<joint type="hinge" axis="0 1 0"/>', "<freejoint/>"
 
 
 def model(joint: str = HINGE, root: str = "", floor: str = "") -> mujoco.MjModel:
-    return compiled(MODEL.format(joint=joint, root=root, floor=floor), False, (0.0, 0.0, 0.0))
+    return bones_of(MODEL.format(joint=joint, root=root, floor=floor), False, (0.0, 0.0, 0.0))[1]
 
 
 def test_a_hip_within_its_fixed_trunk_stays_at_rest() -> None:
@@ -106,7 +106,7 @@ def test_a_hip_within_its_fixed_trunk_stays_at_rest() -> None:
 
 def test_bodies_without_a_name_are_called_by_their_numbers() -> None:
     text = MODEL.replace(' name="trunk"', "").replace(' name="hip"', "")
-    mj = compiled(text.format(joint=HINGE, root="", floor=""), False, (0.0, 0.0, 0.0))
+    mj = bones_of(text.format(joint=HINGE, root="", floor=""), False, (0.0, 0.0, 0.0))[1]
     assert joined_pairs(mj) == ["body1 and body2"]
 
 
@@ -127,8 +127,8 @@ def test_a_leg_still_meets_the_floor_of_the_world() -> None:
     text = MODEL.replace('<body name="trunk" pos="0 0 1">{root}', "").replace(
         "</body></body></body>", "</body></body>"
     )
-    assert joined_pairs(compiled(text.format(joint=HINGE, floor=""), False, (0.0,) * 3)) == [
+    assert joined_pairs(bones_of(text.format(joint=HINGE, floor=""), False, (0.0,) * 3)[1]) == [
         "world and hip"
     ]
     floor = '<geom type="plane" size="1 1 1" pos="0 0 -1"/>'
-    assert joined_pairs(compiled(text.format(joint=HINGE, floor=floor), False, (0.0,) * 3)) == []
+    assert joined_pairs(bones_of(text.format(joint=HINGE, floor=floor), False, (0.0,) * 3)[1]) == []

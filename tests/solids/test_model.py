@@ -111,7 +111,7 @@ def test_slab_inertia(geom: str, area: float, polar: float) -> None:
 def test_slab_stadium_matches_its_outline() -> None:
     """The closed forms of a lying capsule against the polygon of its outline."""
     model = one_body('<geom type="capsule" fromto="-.5 .2 0 .7 .2 0" size=".15"/>', slab=True)
-    section = model.section_of(0)
+    section = model.geom_shape[0].section(*model.rest_pose(0))
     points = section.outline(4000)[:, 0] @ section.axes.T
     x, y = points.T
     xn, yn = np.roll(points, -1, axis=0).T

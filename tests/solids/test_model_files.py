@@ -37,7 +37,7 @@ def copied(files: ModelFiles, folder: Path) -> mujoco.MjModel:
 
 
 def compiled(path: Path, packages: tuple[Path, ...] = ()) -> mujoco.MjModel:
-    return mjcf.compiled(path, False, (0.0, 0.0, 0.0), mjcf.Given(packages=packages))
+    return mjcf.bones_of(path, False, (0.0, 0.0, 0.0), mjcf.Given(packages=packages))[1]
 
 
 URDF = """<robot name="arm" xmlns:xacro="http://www.ros.org/wiki/xacro">

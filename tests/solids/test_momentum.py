@@ -6,7 +6,7 @@ import numpy as np
 from numpy.testing import assert_allclose, assert_array_equal
 
 from flowborne.solids.dynamics import assemble
-from flowborne.solids.model import SolidModel
+from flowborne.solids.model import SolidModel, SolidState
 from flowborne.solids.momentum import (
     MOST_MOMENTA,
     subtree_halfway_momentum,
@@ -15,7 +15,6 @@ from flowborne.solids.momentum import (
 )
 from flowborne.solids.prescribed import prescribe
 from flowborne.solids.scratch import scratch, twists_about_origin
-from flowborne.solids.state import SolidState
 
 CHAIN = """
 <mujoco>

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from flowborne.solids.dynamics import kinematics
-from flowborne.solids.model import SolidModel
+from flowborne.solids.model import SolidModel, SolidState
 from flowborne.solids.momentum import halfway_momentum, kinetic_energy, potential_energy
-from flowborne.solids.state import SolidState
 
 Advance = Callable[..., tuple[SolidState, object]]
 LENGTH, WIDTH, G = 1.2, 0.3, 9.81

@@ -11,9 +11,8 @@ from hypothesis import strategies as st
 
 from flowborne.solids.driven import within_limits
 from flowborne.solids.dynamics import assemble, kinematics
-from flowborne.solids.model import SolidModel
+from flowborne.solids.model import SolidModel, SolidState
 from flowborne.solids.prescribed import PrescribedSystem, prescribe
-from flowborne.solids.state import SolidState
 
 from .held_pose import holding
 

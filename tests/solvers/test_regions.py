@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from flowborne.solvers.deflation import null_basis
 from flowborne.solvers.mobility import dense_mobility
-from flowborne.solvers.pressure import PressureSystem
+from flowborne.solvers.pressure import PressureSystem, null_basis
 
 
 def boxes(shape, walls, periodic=(False, False, False)):

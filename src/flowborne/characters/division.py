@@ -14,8 +14,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from flowborne.base.errors import SceneError
@@ -23,6 +21,7 @@ from flowborne.characters.rig import PLAIN, Array, Integers, Rig, Surface
 from flowborne.shapes.closing import SMALL_HOLE, across_of, fans, loops_of, rims_of, wound
 from flowborne.shapes.mesh import ShapeMesh
 from flowborne.shapes.shape import Mesh
+from flowborne.shapes.thickness import connected, split_quads
 
 WELD_DISTANCE = 1e-7
 """Distance below which points are welded, relative to the size of the surface."""
@@ -162,7 +161,7 @@ def domes(points: Array, loops: list[Integers], centre: Array) -> Mesh:
             above = count + np.arange(len(rim))
             count += len(rim)
             a, b, c, d = np.roll(ring, -1), ring, above, np.roll(above, -1)
-            faces += [np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)]
+            faces.append(split_quads(a, b, c, d))
             ring = above
         corners.append((about + radius.mean() * normal)[None])
         tip = np.full(len(rim), count)
@@ -184,8 +183,7 @@ def weld(points: Array) -> tuple[Integers, Integers]:
             "points."
         )
     pairs = tree.query_pairs(near, output_type="ndarray")
-    links = coo_array((np.ones(len(pairs)), pairs.T), shape=(len(single), len(single)))
-    number = np.asarray(connected_components(links, directed=False)[1])[of_point.ravel()]
+    number = connected(len(single), *pairs.T)[of_point.ravel()]
     return np.unique(number, return_index=True)[1], number
 
 
@@ -224,7 +222,8 @@ def _pieces(
     share = surface.weights @ beyond - BEYOND_WEIGHT
     below = [np.flatnonzero(_parents(rig, owners) == joint) for joint in range(len(owners))]
     share[:, owners != np.arange(len(owners))] = -BEYOND_WEIGHT
-    of_vertex = _last(share)[surface.faces]
+    last = (share > 0.0).cumsum(axis=1).argmax(axis=1)  # beyond which a vertex lies, or the root
+    of_vertex = last[surface.faces]
     pure = (of_vertex == of_vertex[:, :1]).all(axis=1)
     corners = [surface.vertices[surface.faces[pure]].reshape(-1, 3)]
     joints = [of_vertex[pure, 0]]
@@ -272,11 +271,6 @@ def _parents(rig: Rig, owners: Integers) -> Integers:
     """(n,) the moving parent of each moving joint; -1 for the root and for other joints."""
     moves = owners == np.arange(len(owners))
     return np.where(moves & (rig.parents >= 0), owners[rig.parents], -1)
-
-
-def _last(share: Array) -> Integers:
-    """(k,) the last joint with a share (k, n) above 0, or the root if there is none."""
-    return np.asarray((share > 0.0).cumsum(axis=1).argmax(axis=1))
 
 
 def _cut(triangle: Array, heights: list[Array]) -> Array:

@@ -34,6 +34,8 @@ MAX_STEM_BYTES = 150
 CELLS = 64
 """Cells along the longest side of the domain."""
 
+SIDES = "\n".join(f'{axis}_{end} = "open"' for axis in "xyz" for end in ("min", "max"))
+
 
 @dataclass(frozen=True)
 class Imported:
@@ -186,7 +188,7 @@ resolution = {CELLS}
 density = 1000.0
 
 [boundaries]
-{_sides()}
+{SIDES}
 
 [solids]
 model = "{name}.xml"
@@ -217,10 +219,6 @@ exports = ["{name}.glb"]
 def _quoted(text: str) -> str:
     """A text as a TOML string."""
     return tomli_w.dumps({"text": text}).partition("= ")[2].strip()
-
-
-def _sides() -> str:
-    return "\n".join(f'{axis}_{end} = "open"' for axis in "xyz" for end in ("min", "max"))
 
 
 def _corner(point: Array) -> list[float]:

@@ -18,7 +18,8 @@ from PIL import Image
 
 from flowborne.base.colours import to_linear, to_srgb
 from flowborne.base.errors import SceneError
-from flowborne.characters.gltf_document import Accessor, Document, Primitive, TextureInfo, embedded
+from flowborne.characters.gltf_document import Document, Primitive, TextureInfo, embedded
+from flowborne.characters.limits import wrong
 from flowborne.characters.rig import PLAIN, Array, Integers
 
 KINDS = {
@@ -41,132 +42,128 @@ MAX_PIXELS = 1 << 26
 class Accessors:
     """The arrays of a document.
 
+    name, document, buffers  of the file
     raises  SceneError when one of them lies outside its view or its buffer
     """
 
     def __init__(self, name: str, document: Document, buffers: list[memoryview]) -> None:
-        self._name, self._document, self._buffers = name, document, buffers
+        self.name, self.document, self.buffers = name, document, buffers
         for number, view in enumerate(document.buffer_views):
             where = f"{name}, bufferViews[{number}]"
             within(view.buffer, buffers, f"{where}.buffer", "buffers")
             end, size = view.byte_offset + view.byte_length, len(buffers[view.buffer])
             if end > size:
                 raise wrong(f"{where} ends at byte {end} of a buffer of {size}")
-        for number, accessor in enumerate(document.accessors):
-            self._check(accessor, f"{name}, accessors[{number}]")
-
-    def __len__(self) -> int:
-        return len(self._document.accessors)
-
-    def table(self, number: int) -> Accessor:
-        """An accessor of the document."""
-        return self._document.accessors[number]
+        for number in range(len(document.accessors)):
+            self._stored(number)
 
     def read(self, number: int) -> NDArray[Any]:
         """(count, width) the elements of an accessor; normalized integers become floats."""
-        accessor = self.table(number)
+        accessor = self.document.accessors[number]
         kind, width = np.dtype(KINDS[accessor.component_type]), WIDTHS[accessor.type]
-        if accessor.buffer_view is None:
+        values, replaced = self._stored(number)
+        if values is None:
             values = np.zeros((accessor.count, width), kind)
-        else:
-            first = accessor.byte_offset
-            values = self._view(accessor.buffer_view, first, kind, accessor.count, width)
-        if accessor.sparse is not None:
-            new, count = accessor.sparse.values, accessor.sparse.count
+        if replaced is not None:
             values = values.copy()
-            values[self._rows(accessor)] = self._view(
-                new.buffer_view, new.byte_offset, kind, count, width
-            )
+            values[replaced[0]] = replaced[1]
         if accessor.normalized and kind.kind in "iu":
             largest = 2.0 ** (8 * kind.itemsize - (kind.kind == "i")) - 1.0
             return np.maximum(values.astype(float) / largest, -1.0)
         return values
 
-    def numbers(self, number: int, where: str) -> Array:
-        """(count, width) the elements as floats; raises SceneError unless all are finite."""
+    def numbers(self, number: int, type_: str | None, kinds: tuple[int, ...], where: str) -> Array:
+        """(count, width) the elements as floats.
+
+        raises  SceneError unless all are finite, of a type and of one of some component types
+        """
+        self._check_kind(number, type_, kinds, where)
         values = self.read(number).astype(float)
         if not np.isfinite(values).all():
             row = int(np.flatnonzero(~np.isfinite(values).all(axis=1))[0])
             raise wrong(f"{where} (accessors[{number}]): element {row} is not a finite number")
         return values
 
-    def indices(self, number: int, count: int, where: str, what: str) -> Integers:
-        """(count, width) the elements as integers; raises SceneError for one from `count` on."""
+    def indices(
+        self, number: int, type_: str, kinds: tuple[int, ...], limit: tuple[int, str], where: str
+    ) -> Integers:
+        """(count, width) the elements as integers; as `numbers`.
+
+        limit   number of things that they are indices of, and what these are
+        raises  SceneError for an index without a thing
+        """
+        self._check_kind(number, type_, kinds, where)
         values = self.read(number).astype(np.int64)
-        if (largest := int(values.max())) >= count:
+        if (largest := int(values.max())) >= limit[0]:
             raise wrong(
-                f"{where} (accessors[{number}]) has index {largest}, but there are {count} {what}"
+                f"{where} (accessors[{number}]) has index {largest}, but there are {limit[0]} "
+                f"{limit[1]}"
             )
         return values
 
-    def _check(self, accessor: Accessor, where: str) -> None:
-        kind, width = np.dtype(KINDS[accessor.component_type]), WIDTHS[accessor.type]
-        if accessor.count * width > MAX_NUMBERS:
-            raise SceneError(
-                f"{where} needs {accessor.count * width:,} numbers; the maximum is "
-                f"{MAX_NUMBERS:,}. Export fewer points or keys."
-            )
-        if accessor.buffer_view is not None:
-            self._fits(
-                accessor.buffer_view, accessor.byte_offset, kind, accessor.count, width, where
-            )
-        if accessor.sparse is not None:
-            where, sparse = f"{where}.sparse", accessor.sparse
-            if sparse.count > accessor.count:
-                raise wrong(f"{where} replaces {sparse.count} elements of {accessor.count}")
-            own, new = sparse.indices, sparse.values
-            chosen = np.dtype(KINDS[own.component_type])
-            self._fits(own.buffer_view, own.byte_offset, chosen, sparse.count, 1, where)
-            self._fits(new.buffer_view, new.byte_offset, kind, sparse.count, width, where)
-            if (largest := int(self._rows(accessor).max())) >= accessor.count:
-                raise wrong(f"{where} has index {largest}, but there are {accessor.count} elements")
-
-    def _rows(self, accessor: Accessor) -> NDArray[Any]:
-        """(count,) indices of the elements that the sparse part of an accessor replaces."""
-        assert accessor.sparse is not None
-        own, count = accessor.sparse.indices, accessor.sparse.count
-        kind = np.dtype(KINDS[own.component_type])
-        return self._view(own.buffer_view, own.byte_offset, kind, count, 1).ravel()
-
-    def _fits(
-        self, number: int, first: int, kind: np.dtype[Any], count: int, width: int, where: str
+    def _check_kind(
+        self, number: int, type_: str | None, kinds: tuple[int, ...], where: str
     ) -> None:
-        """Raise SceneError unless `count` elements lie within a view."""
-        views = self._document.buffer_views
-        within(number, views, f"{where}.bufferView", "bufferViews")
-        size = width * kind.itemsize
-        step = views[number].byte_stride or size
-        if step < size:
-            raise wrong(f"{where}: its elements have {size} bytes, but byteStride is {step}")
-        end = first + step * (count - 1) + size
-        if end > views[number].byte_length:
+        within(number, self.document.accessors, where, "accessors")
+        accessor = self.document.accessors[number]
+        if accessor.type != (type_ or accessor.type) or accessor.component_type not in kinds:
             raise wrong(
-                f"{where} ends at byte {end} of bufferViews[{number}], which has "
-                f"{views[number].byte_length}"
+                f"{where} (accessors[{number}]) is {accessor.type} of components "
+                f"{accessor.component_type}, not {type_} of {' or '.join(map(str, kinds))}"
             )
+
+    def _stored(
+        self, number: int
+    ) -> tuple[NDArray[Any] | None, tuple[NDArray[Any], NDArray[Any]] | None]:
+        """The elements of an accessor in its buffer, and the indices of those that its sparse part
+        replaces, with the new ones; None without them."""
+        accessor, where = self.document.accessors[number], f"{self.name}, accessors[{number}]"
+        kind, count, width = accessor.component_type, accessor.count, WIDTHS[accessor.type]
+        if count * width > MAX_NUMBERS:
+            raise SceneError(
+                f"{where} needs {count * width:,} numbers; the maximum is {MAX_NUMBERS:,}. Export "
+                "fewer points or keys."
+            )
+        values, view, first = None, accessor.buffer_view, accessor.byte_offset
+        if view is not None:
+            values = self._view(view, first, kind, (count, width), where)
+        sparse, where = accessor.sparse, f"{where}.sparse"
+        if sparse is None:
+            return values, None
+        if sparse.count > count:
+            raise wrong(f"{where} replaces {sparse.count} elements of {count}")
+        own, new, many = sparse.indices, sparse.values, sparse.count
+        chosen = own.component_type
+        rows = self._view(own.buffer_view, own.byte_offset, chosen, (many, 1), where).ravel()
+        others = self._view(new.buffer_view, new.byte_offset, kind, (many, width), where)
+        if (largest := int(rows.max())) >= count:
+            raise wrong(f"{where} has index {largest}, but there are {count} elements")
+        return values, (rows, others)
 
     def _view(
-        self, number: int, first: int, kind: np.dtype[Any], count: int, width: int
+        self, number: int, first: int, kind: int, shape: tuple[int, int], where: str
     ) -> NDArray[Any]:
-        view = self._document.buffer_views[number]
-        step = view.byte_stride or width * kind.itemsize
-        return np.ndarray(
-            (count, width),
-            kind,
-            self._buffers[view.buffer],
-            view.byte_offset + first,
-            (step, kind.itemsize),
-        )
+        """(count, width) elements from a byte on; raises SceneError unless they are in the view."""
+        within(number, self.document.buffer_views, f"{where}.bufferView", "bufferViews")
+        view, type_ = self.document.buffer_views[number], np.dtype(KINDS[kind])
+        size = shape[1] * type_.itemsize
+        step = view.byte_stride or size
+        if step < size:
+            raise wrong(f"{where}: its elements have {size} bytes, but byteStride is {step}")
+        end = first + step * (shape[0] - 1) + size
+        if end > view.byte_length:
+            raise wrong(
+                f"{where} ends at byte {end} of bufferViews[{number}], which has {view.byte_length}"
+            )
+        start, strides = view.byte_offset + first, (step, type_.itemsize)
+        return np.ndarray(shape, type_, self.buffers[view.buffer], start, strides)
 
 
 class Colours:
     """The colours of a document's meshes."""
 
-    def __init__(
-        self, name: str, document: Document, arrays: Accessors, buffers: list[memoryview]
-    ) -> None:
-        self._name, self._document, self._arrays = name, document, arrays
-        self._buffers = buffers
+    def __init__(self, arrays: Accessors) -> None:
+        self._name, self._document, self._arrays = arrays.name, arrays.document, arrays
         self._images: dict[int, Image.Image | None] = {}
 
     def of(self, part: Primitive, triangles: Integers, points: int) -> Array:
@@ -195,8 +192,7 @@ class Colours:
             return np.ones((len(triangles), 3))
         within(source, self._document.images, f"{self._name}, textures[{texture.index}]", "images")
         where = f"{self._name}, {layer}"
-        within(part.attributes[layer], self._arrays, where, "accessors")
-        coordinates = self._arrays.numbers(part.attributes[layer], where)
+        coordinates = self._arrays.numbers(part.attributes[layer], None, tuple(KINDS), where)
         if coordinates.shape != (points, 2):
             raise wrong(f"{where} is not a pair of numbers for each of the {points} points")
         if source not in self._images:
@@ -212,7 +208,7 @@ class Colours:
             if image.buffer_view is not None:
                 view = self._document.buffer_views[image.buffer_view]
                 end = view.byte_offset + view.byte_length
-                content = bytes(self._buffers[view.buffer][view.byte_offset : end])
+                content = bytes(self._arrays.buffers[view.buffer][view.byte_offset : end])
             else:
                 content = embedded(image.uri or "")
             found = Image.open(BytesIO(content))
@@ -238,8 +234,3 @@ def within(number: int, things: Any, where: str, what: str) -> None:
     """Raise SceneError unless a list has an entry of this number."""
     if number >= len(things):
         raise wrong(f"{where} is {number}, but the file has {len(things)} {what}")
-
-
-def wrong(said: str) -> SceneError:
-    """The error of a file that contradicts itself."""
-    return SceneError(f"{said}. Export it again.")

@@ -17,7 +17,7 @@ from pydantic.alias_generators import to_camel
 
 from flowborne.base.errors import SceneError
 from flowborne.base.given import check_file
-from flowborne.characters.limits import MAX_FILE_BYTES
+from flowborne.characters.limits import MAX_FILE_BYTES, wrong
 
 JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942
 
@@ -183,17 +183,11 @@ def read_document(path: Path) -> tuple[Document, list[memoryview]]:
     except ValidationError as error:
         first = error.errors()[0]
         value = "" if first["type"] == "missing" else f", not {repr(first['input'])[:60]}"
-        raise SceneError(
-            f"{path.name}, {_place(first['loc'])}: {first['msg']}{value}. Export it again."
-        ) from None
+        raise wrong(f"{path.name}, {_place(first['loc'])}: {first['msg']}{value}") from None
     except RecursionError:
-        raise SceneError(
-            f"{path.name}: its JSON is nested hundreds deep. Export it again."
-        ) from None
+        raise wrong(f"{path.name}: its JSON is nested hundreds deep") from None
     except ValueError as error:
-        raise SceneError(
-            f"{path.name} cannot be read as glTF: {str(error)[:100]}. Export it again."
-        ) from None
+        raise wrong(f"{path.name} cannot be read as glTF: {str(error)[:100]}") from None
     return document, _buffers(path, document, binary)
 
 
@@ -223,14 +217,14 @@ def _chunks(name: str, data: bytes) -> tuple[bytes, bytes | None]:
     while start + 8 <= len(data):
         length, kind = struct.unpack_from("<II", data, start)
         if start + 8 + length > len(data):
-            raise SceneError(
+            raise wrong(
                 f"{name} cannot be read as glTF: a chunk of {length} bytes at byte {start} ends "
-                f"after the file, which has {len(data)}. Export it again."
+                f"after the file, which has {len(data)}"
             )
         found.setdefault(kind, data[start + 8 : start + 8 + length])
         start += 8 + length
     if JSON_CHUNK not in found:
-        raise SceneError(f"{name} cannot be read as glTF: it has no JSON chunk. Export it again.")
+        raise wrong(f"{name} cannot be read as glTF: it has no JSON chunk")
     return found[JSON_CHUNK], found.get(BINARY_CHUNK)
 
 
@@ -249,11 +243,10 @@ def _buffers(path: Path, document: Document, binary: bytes | None) -> list[memor
         elif number == 0 and binary is not None:
             data = binary
         else:
-            raise SceneError(f"{where} has neither a uri nor a binary chunk. Export it again.")
+            raise wrong(f"{where} has neither a uri nor a binary chunk")
         if len(data) < buffer.byte_length:
-            raise SceneError(
-                f"{where} has {len(data)} bytes, and its byteLength is {buffer.byte_length}. "
-                "Export it again."
+            raise wrong(
+                f"{where} has {len(data)} bytes, and its byteLength is {buffer.byte_length}"
             )
         found.append(memoryview(data)[: buffer.byte_length])
     return found
@@ -265,9 +258,7 @@ def _from_uri(path: Path, uri: str, where: str) -> bytes:
         try:
             return embedded(uri)
         except ValueError as error:
-            raise SceneError(
-                f"{where}: its data uri cannot be read ({error}). Export it again."
-            ) from None
+            raise wrong(f"{where}: its data uri cannot be read ({error})") from None
     file = path.parent / inside(uri, path.parent, where)
     return _bounded(file, f"{where}, {uri[:100]!r},")
 

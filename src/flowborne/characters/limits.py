@@ -27,6 +27,9 @@ MAX_SKINNING = 5e10
 MAX_COORDINATE = 1e6
 """m"""
 
+MAX_SCALE = 1e12
+"""Entry of a joint's frame."""
+
 MIN_SIZE = 1e-6
 """m along the longest side of a surface."""
 
@@ -35,6 +38,11 @@ KEY_INTERVALS = (1e-5, 1e4)
 
 MAX_NAME_LENGTH = 100
 """Characters of a joint's name."""
+
+
+def wrong(said: str) -> SceneError:
+    """The error of a file that contradicts itself."""
+    return SceneError(f"{said}. Export it again.")
 
 
 def check_size(joints: int, vertices: int, where: str) -> None:
@@ -70,17 +78,6 @@ def check_points(points: Array, where: str) -> None:
         raise SceneError(
             f"{where}: a point has a coordinate of {largest:.3g} m; the maximum is "
             f"{MAX_COORDINATE:g} m. Look for stray points, or scale the character before exporting."
-        )
-
-
-def check_poses(matrices: Array, where: str) -> None:
-    """Raise SceneError unless frames (..., 4, 4) are finite and near the origin."""
-    check_points(matrices[..., :3, 3], where)
-    with np.errstate(all="ignore"):
-        largest = float(np.abs(matrices[..., :3, :3]).max(initial=0.0))
-    if not largest < 1e12:
-        raise SceneError(
-            f"{where}: a joint is scaled by {largest:.3g}. Apply scales before exporting."
         )
 
 

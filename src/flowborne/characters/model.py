@@ -39,6 +39,8 @@ def model_files(
 
     density  kg/m^3 of all pieces
     """
+    import trimesh  # takes a tenth of a second
+
     files = {}
     root = ElementTree.Element("mujoco", model=name)
     default = ElementTree.SubElement(root, "default")
@@ -66,7 +68,8 @@ def model_files(
             )
             files[file] = _obj(shape)
             ElementTree.SubElement(assets, "mesh", name=own, file=file)
-            mass = mass_of(piece, density)
+            vertices, faces = piece
+            mass = trimesh.triangles.mass_properties(vertices[faces], density=density)
             body.append(_inertial(mass))
             data = _numbers(np.array([mass.volume, *mass.center_mass]))
             ElementTree.SubElement(custom, "numeric", name=DISPLACED + own, data=data)
@@ -76,15 +79,8 @@ def model_files(
     return files
 
 
-def mass_of(mesh: Mesh, density: float) -> Any:
-    """Mass, centre and inertia of a closed surface, computed by trimesh."""
-    import trimesh  # takes a tenth of a second
-
-    vertices, faces = mesh
-    return trimesh.triangles.mass_properties(vertices[faces], density=density)
-
-
 def _inertial(mass: Any) -> Element:
+    """Mass, centre and inertia of a closed surface, computed by trimesh."""
     (xx, xy, xz), (_, yy, yz), (_, _, zz) = mass.inertia
     return ElementTree.Element(
         "inertial",

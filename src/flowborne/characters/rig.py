@@ -13,9 +13,9 @@ import numpy as np
 from flowborne.base.errors import SceneError
 from flowborne.characters.limits import (
     MAX_NAME_LENGTH,
+    MAX_SCALE,
     check_frames,
     check_points,
-    check_poses,
     check_surface,
 )
 from flowborne.kernels.arrays import Array, Integers
@@ -125,8 +125,11 @@ def scaled(rig: Rig, surface: Surface, scale: float, name: str) -> tuple[Rig, Su
 def size_notes(vertices: Array, mass: float, scale: float, name: str) -> Iterator[str]:
     """A note if a surface (k, 3), m, is far longer than any animal.
 
-    mass    kg scale   already applied to the surface name    of its file, for messages raises
-    SceneError when it is far smaller than any animal: MuJoCo refuses the inertia of its parts
+    mass    kg
+    scale   already applied to the surface
+    name    of its file, for messages
+    raises  SceneError when it is far smaller than any animal: MuJoCo refuses the inertia of its
+            parts
     """
     length = float(np.ptp(vertices, axis=0).max())
     more = 10.0 ** round(-math.log10(length))
@@ -176,22 +179,24 @@ def one_tree(parents: list[int]) -> Integers:
     return np.array([-1, *(max(parent, 0) for parent in parents[1:])], np.int64)
 
 
-def rotations_in(matrices: Array) -> Array:
-    """(..., 3, 3) the rotation nearest to each matrix (..., 3, 3), which may scale and shear."""
-    left, _, right = np.linalg.svd(matrices)
-    flips = np.where(np.linalg.det(left @ right) < 0.0, -1.0, 1.0)
-    left[..., :, 2] *= flips[..., None]
-    return np.asarray(left @ right)
-
-
 def placed(matrices: Array, where: str) -> tuple[Array, Array]:
-    """(..., 3) m and (..., 3, 3), positions and rotations of frames (..., 4, 4).
+    """(..., 3) m and (..., 3, 3), positions and nearest rotations of frames (..., 4, 4), which may
+    scale and shear.
 
     where   the file and the part of it, for messages
     raises  SceneError when they are not finite, or too far away
     """
-    check_poses(matrices, where)
-    return matrices[..., :3, 3], rotations_in(matrices[..., :3, :3])
+    check_points(matrices[..., :3, 3], where)
+    with np.errstate(all="ignore"):
+        largest = float(np.abs(matrices[..., :3, :3]).max(initial=0.0))
+    if not largest < MAX_SCALE:
+        raise SceneError(
+            f"{where}: a joint is scaled by {largest:.3g}. Apply scales before exporting."
+        )
+    left, _, right = np.linalg.svd(matrices[..., :3, :3])
+    flips = np.where(np.linalg.det(left @ right) < 0.0, -1.0, 1.0)
+    left[..., :, 2] *= flips[..., None]
+    return matrices[..., :3, 3], np.asarray(left @ right)
 
 
 def normalised(weights: Array, root: int) -> Array:

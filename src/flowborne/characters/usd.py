@@ -1,11 +1,16 @@
-"""Skins, weights and animations of UsdSkel, by usd-core.
+"""Skins, weights and animations of UsdSkel, by usd-core, checked as they are read.
 
-source  OpenUSD, UsdSkel schemas: binding API, SkelAnimation
+As a program, it is the process in which `usd_gate.probe` reads a binary file first, because reading
+may crash.
+
+source  OpenUSD: UsdGeomMesh; UsdSkel schemas, binding API and SkelAnimation
 """
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cached_property, wraps
 from pathlib import Path
 from typing import Any, TypeVar
@@ -15,7 +20,7 @@ from pxr import Usd, UsdGeom, UsdShade, UsdSkel
 
 from flowborne.base.colours import to_srgb
 from flowborne.base.errors import SceneError
-from flowborne.characters.limits import check_size
+from flowborne.characters.limits import MAX_POSES, check_size, wrong
 from flowborne.characters.rig import (
     PLAIN,
     Z_UP,
@@ -33,19 +38,12 @@ from flowborne.characters.rig import (
     sampled_action,
     unique_names,
 )
-from flowborne.characters.usd_gate import (
-    check_faces,
-    check_influences,
-    check_samples,
-    check_topology,
-    open_stage,
-    points_of,
-    reading_usd,
-)
+from flowborne.characters.usd_gate import EVERYTHING, open_stage, reading_usd
 
 Result = TypeVar("Result")
 
-EVERYTHING = Usd.TraverseInstanceProxies(Usd.PrimAllPrimsPredicate)
+MAX_MEMORY = 8 << 30
+"""Limit of the address space of that process, bytes; Windows has no such limit."""
 
 
 def _reading(method: Callable[..., Result]) -> Callable[..., Result]:
@@ -85,9 +83,9 @@ class UsdSource:
         self._skeleton = skeletons[0]
         self._query = self._cache.GetSkelQuery(self._skeleton)
         if not self._query:
-            raise SceneError(f"{path.name}: its skeleton is damaged. Export it again.")
+            raise wrong(f"{path.name}: its skeleton is damaged")
         check_size(len(self._query.GetJointOrder()), 0, path.name)
-        check_topology(self._query, path.name)
+        self._check_topology()
         self._animations = [UsdSkel.Animation(p) for p in prims if p.IsA(UsdSkel.Animation)]
         self._world = UsdGeom.XformCache(Usd.TimeCode.Default())
         turn = np.eye(3) if UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.z else Z_UP
@@ -129,7 +127,7 @@ class UsdSource:
                 if not mesh or not target.HasJointInfluences():
                     continue
                 where = f"{self._name}, {mesh.GetPath()}"
-                points = points_of(mesh, where)
+                points = _points(mesh, where)
                 count += len(points)
                 check_size(len(self._query.GetJointOrder()), count, self._name)
                 own = into @ _matrices([target.GetGeomBindTransform()])[0]
@@ -174,7 +172,11 @@ class UsdSource:
         rate = self._stage.GetTimeCodesPerSecond()
         if not 1e-6 <= rate <= 1e6:
             raise SceneError(f"{self._name}: timeCodesPerSecond is {rate:.3g}. Set it to 24.")
-        check_samples(len(codes), len(order), where)
+        if len(codes) * len(order) > MAX_POSES:
+            raise SceneError(
+                f"{where} needs {len(codes):,} samples of {len(order)} joints; the maximum is "
+                f"{MAX_POSES:,} poses. Export a shorter clip."
+            )
         times = frame_times(codes / rate, codes / rate, len(order), where)
         rest = _matrices(self._query.ComputeJointLocalTransforms(Usd.TimeCode.Default(), True))
         local = np.tile(rest, (len(times), 1, 1, 1))
@@ -182,9 +184,7 @@ class UsdSource:
         for frame, time in enumerate(times):
             poses = query.ComputeJointLocalTransforms(time * rate)
             if len(poses or ()) != len(joints):
-                raise SceneError(
-                    f"{where} has not a pose for each of its {len(joints)} joints. Export it again."
-                )
+                raise wrong(f"{where} has not a pose for each of its {len(joints)} joints")
             local[frame, known] = _matrices(poses)[own]
         world, into = local.copy(), self._to_world(self._skeleton.GetPrim())
         for joint in range(len(order)):
@@ -192,6 +192,20 @@ class UsdSource:
             above = into if parent < 0 else world[:, parent]
             world[:, joint] = above @ local[:, joint]
         return sampled_action(times, world, where)
+
+    def _check_topology(self) -> None:
+        """Raise SceneError unless the joints are a tree with a pose for each of them."""
+        query, name = self._query, self._name
+        joints = len(query.GetJointOrder())
+        valid, reason = query.GetTopology().Validate() if joints else (False, "it has none")
+        if not valid:
+            raise wrong(f"{name}: the skeleton's joints are not a tree ({reason})")
+        for what, poses in (
+            ("bindTransforms", query.GetJointWorldBindTransforms()),
+            ("restTransforms", query.ComputeJointLocalTransforms(Usd.TimeCode.Default(), True)),
+        ):
+            if (count := len(poses or ())) != joints:
+                raise wrong(f"{name}: the skeleton has {count} {what} for {joints} joints")
 
     def _to_world(self, prim: Usd.Prim) -> Array:
         """(4, 4) a prim's frame to the world's, m, z up."""
@@ -207,11 +221,20 @@ class UsdSource:
         order = [str(joint) for joint in self._query.GetJointOrder()]
         own = target.GetJointOrder()
         if lost := [str(joint) for joint in own or () if str(joint) not in order]:
-            raise SceneError(
-                f"{where} names joint '{lost[0]}', which is not in the skeleton. Export it again."
-            )
+            raise wrong(f"{where} names joint '{lost[0]}', which is not in the skeleton")
         number = np.array([order.index(str(joint)) for joint in own] if own else range(len(order)))
-        check_influences(indices, shares, count * width, len(number), where)
+        if len(indices) != count * width or len(shares) != count * width:
+            raise wrong(
+                f"{where} has {len(indices)} jointIndices and {len(shares)} jointWeights, not "
+                f"{count * width}"
+            )
+        if len(indices) and (indices.min() < 0 or indices.max() >= len(number)):
+            raise wrong(
+                f"{where}.jointIndices are {indices.min()} to {indices.max()}, but there are "
+                f"{len(number)} joints"
+            )
+        if not np.isfinite(shares).all() or (shares < 0.0).any():
+            raise wrong(f"{where}.jointWeights are not all finite and at least 0")
         found = np.zeros((count, len(order)))
         rows = np.arange(count)[:, None]
         joints = number[indices.reshape(count, width)]
@@ -238,12 +261,32 @@ def _colour(mesh: UsdGeom.Mesh) -> Array:
     return to_srgb(np.array(shown, float).mean(axis=0))
 
 
+def _points(mesh: UsdGeom.Mesh, where: str) -> Array:
+    """(k, 3) the points of a mesh, by default or at its first time."""
+    for time in (Usd.TimeCode.Default(), Usd.TimeCode.EarliestTime()):
+        points = mesh.GetPointsAttr().Get(time)
+        if points:
+            return np.array(points, float)
+    raise wrong(f"{where}: it has no points")
+
+
 def _triangles(mesh: UsdGeom.Mesh, points: int, mirrored: bool, where: str) -> Integers:
     """(m, 3) the faces of a mesh as fans, outward."""
     earliest = Usd.TimeCode.EarliestTime()
     counts = np.array(mesh.GetFaceVertexCountsAttr().Get(earliest) or (), np.int64)
     corners = np.array(mesh.GetFaceVertexIndicesAttr().Get(earliest) or (), np.int64)
-    check_faces(counts, corners, points, where)
+    if not len(counts) or counts.min() < 3:
+        raise wrong(f"{where}.faceVertexCounts: a face needs 3 corners or more")
+    if counts.sum() != len(corners):
+        raise wrong(
+            f"{where}.faceVertexCounts add up to {counts.sum()}, but there are {len(corners)} "
+            "faceVertexIndices"
+        )
+    if corners.min() < 0 or corners.max() >= points:
+        raise wrong(
+            f"{where}.faceVertexIndices are {corners.min()} to {corners.max()}, but the mesh has "
+            f"{points} points"
+        )
     starts = np.cumsum(counts) - counts
     fans = [
         corners[[start, start + n, start + n + 1]]
@@ -252,3 +295,22 @@ def _triangles(mesh: UsdGeom.Mesh, points: int, mirrored: bool, where: str) -> I
     ]
     triangles = np.array(fans, np.int64).reshape(-1, 3)
     return triangles[:, ::-1] if mirrored else triangles
+
+
+def read_all(path: Path) -> None:
+    """Read all that an import reads. The calling process reports errors."""
+    if sys.platform != "win32":
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_AS, (MAX_MEMORY, MAX_MEMORY))
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    with suppress(SceneError):
+        source = UsdSource(path, probed=True)
+        _ = source.rig, source.surface
+        for clip in range(len(source.clips)):
+            with suppress(SceneError):
+                source.action(clip)
+
+
+if __name__ == "__main__":
+    read_all(Path(sys.argv[1]))

@@ -1,9 +1,9 @@
-"""Checks of a USD file, before an import uses it.
+"""Opening of a USD file, checked before an import uses it.
 
 A damaged binary file can crash the process that reads it, and no check in that process prevents it.
 Another process reads it first.
 
-source  OpenUSD: UsdGeomMesh, UsdSkelBindingAPI; SdfLayer.GetCompositionAssetDependencies
+source  OpenUSD: SdfLayer.GetCompositionAssetDependencies
 """
 
 from __future__ import annotations
@@ -17,11 +17,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pxr import Ar, Sdf, Tf, Usd, UsdGeom, UsdSkel
+from pxr import Ar, Sdf, Tf, Usd
 
 from flowborne.base.errors import SceneError
-from flowborne.characters.limits import MAX_FILE_BYTES, MAX_POSES
-from flowborne.characters.rig import Array, Integers
+from flowborne.characters.limits import MAX_FILE_BYTES, wrong
+
+EVERYTHING = Usd.TraverseInstanceProxies(Usd.PrimAllPrimsPredicate)
 
 MAX_LAYERS = 1000
 MAX_PRIMS = 100_000
@@ -61,8 +62,7 @@ def open_stage(path: Path, *, probed: bool = False) -> Usd.Stage:
                 "(usdcat --flatten)."
             )
     stage = Usd.Stage.Open(str(path))
-    everything = Usd.TraverseInstanceProxies(Usd.PrimAllPrimsPredicate)
-    for number, _ in enumerate(Usd.PrimRange.Stage(stage, everything)):
+    for number, _ in enumerate(Usd.PrimRange.Stage(stage, EVERYTHING)):
         if number >= MAX_PRIMS:
             raise SceneError(
                 f"{path.name} has more than {MAX_PRIMS:,} prims. Export the character alone."
@@ -72,7 +72,7 @@ def open_stage(path: Path, *, probed: bool = False) -> Usd.Stage:
 
 def probe(path: Path) -> None:
     """Raise SceneError unless another process can read a file."""
-    command = [sys.executable, "-P", "-m", "flowborne.characters.usd_process", str(path)]
+    command = [sys.executable, "-P", "-m", "flowborne.characters.usd", str(path)]
     nowhere = subprocess.DEVNULL
     try:
         done = subprocess.run(
@@ -89,9 +89,7 @@ def probe(path: Path) -> None:
             "character."
         ) from None
     if done.returncode:
-        raise SceneError(
-            f"{path.name} cannot be read as USD: reading it crashes the process. Export it again."
-        )
+        raise wrong(f"{path.name} cannot be read as USD: reading it crashes the process")
 
 
 @contextmanager
@@ -108,73 +106,10 @@ def reading_usd(name: str) -> Iterator[None]:
         try:
             yield
         except (Tf.ErrorException, TypeError, RuntimeError, ValueError, MemoryError) as error:
-            raise _unreadable(name) from error
+            raise wrong(f"{name} cannot be read as USD") from error
         finally:
             os.dup2(kept, 2)
             os.close(kept)
-
-
-def check_topology(query: UsdSkel.SkeletonQuery, name: str) -> None:
-    """Raise SceneError unless a skeleton's joints are a tree with a pose for each of them."""
-    joints = len(query.GetJointOrder())
-    valid, reason = query.GetTopology().Validate() if joints else (False, "it has none")
-    if not valid:
-        raise _wrong(f"{name}: the skeleton's joints are not a tree ({reason})")
-    for what, poses in (
-        ("bindTransforms", query.GetJointWorldBindTransforms()),
-        ("restTransforms", query.ComputeJointLocalTransforms(Usd.TimeCode.Default(), True)),
-    ):
-        if len(poses or ()) != joints:
-            raise _wrong(f"{name}: the skeleton has {len(poses or ())} {what} for {joints} joints")
-
-
-def points_of(mesh: UsdGeom.Mesh, where: str) -> Array:
-    """(k, 3) the points of a mesh, by default or at its first time."""
-    for time in (Usd.TimeCode.Default(), Usd.TimeCode.EarliestTime()):
-        points = mesh.GetPointsAttr().Get(time)
-        if points:
-            return np.array(points, float)
-    raise _wrong(f"{where}: it has no points")
-
-
-def check_faces(counts: Integers, corners: Integers, points: int, where: str) -> None:
-    """Raise SceneError unless the sizes and corners of a mesh's faces fit its points."""
-    if not len(counts) or counts.min() < 3:
-        raise _wrong(f"{where}.faceVertexCounts: a face needs 3 corners or more")
-    if counts.sum() != len(corners):
-        raise _wrong(
-            f"{where}.faceVertexCounts add up to {counts.sum()}, but there are {len(corners)} "
-            "faceVertexIndices"
-        )
-    if corners.min() < 0 or corners.max() >= points:
-        raise _wrong(
-            f"{where}.faceVertexIndices are {corners.min()} to {corners.max()}, but the mesh has "
-            f"{points} points"
-        )
-
-
-def check_influences(indices: Integers, weights: Array, size: int, joints: int, where: str) -> None:
-    """Raise SceneError unless there are `size` influences of a mesh by existing joints."""
-    if len(indices) != size or len(weights) != size:
-        raise _wrong(
-            f"{where} has {len(indices)} jointIndices and {len(weights)} jointWeights, not {size}"
-        )
-    if size and (indices.min() < 0 or indices.max() >= joints):
-        raise _wrong(
-            f"{where}.jointIndices are {indices.min()} to {indices.max()}, but there are {joints} "
-            "joints"
-        )
-    if not np.isfinite(weights).all() or (weights < 0.0).any():
-        raise _wrong(f"{where}.jointWeights are not all finite and at least 0")
-
-
-def check_samples(samples: int, joints: int, where: str) -> None:
-    """Raise SceneError where a clip has too many samples for its joints."""
-    if samples * joints > MAX_POSES:
-        raise SceneError(
-            f"{where} needs {samples:,} samples of {joints} joints; the maximum is {MAX_POSES:,} "
-            "poses. Export a shorter clip."
-        )
 
 
 def _is_text(name: str) -> bool:
@@ -196,7 +131,7 @@ def _layer(name: str, where: str) -> Sdf.Layer:
         )
     layer = Sdf.Layer.FindOrOpen(name)
     if layer is None:
-        raise _unreadable(where)
+        raise wrong(f"{where} cannot be read as USD")
     return layer
 
 
@@ -221,11 +156,3 @@ def _named_files(layer: Sdf.Layer) -> list[str]:
 
     layer.Traverse(layer.pseudoRoot.path, visit)
     return sorted(name for name in named if name)
-
-
-def _unreadable(where: str) -> SceneError:
-    return SceneError(f"{where} cannot be read as USD. Export it again.")
-
-
-def _wrong(said: str) -> SceneError:
-    return SceneError(f"{said}. Export it again.")

@@ -11,13 +11,20 @@ import numpy as np
 
 from flowborne.base.errors import SceneError
 from flowborne.control.creature import within_range
-from flowborne.coupling.motion import Told, Trajectory
-from flowborne.coupling.servo import Servo, ServoExact, ServoPD, TrajectoryServo, driven
 from flowborne.coupling.world import Setup, World
 from flowborne.kernels.arrays import Array, Integers
-from flowborne.motion.tracks import TrajectoryKnots
 from flowborne.solids.actuators import actuators
 from flowborne.solids.model import FREE, SolidModel
+from flowborne.solids.trajectories import (
+    Servo,
+    ServoExact,
+    ServoPD,
+    Told,
+    Trajectory,
+    TrajectoryKnots,
+    TrajectoryServo,
+    driven,
+)
 
 Numbers = float | Sequence[float] | Array
 

@@ -26,10 +26,9 @@ from flowborne.control.phases import Phases
 from flowborne.control.plan import Horizon, PlanCourse
 from flowborne.control.rules import FixedStep, Rule
 from flowborne.control.trial import Hypothesis, PoseCourse, without_scalars
-from flowborne.coupling.motion import JointCommand
 from flowborne.coupling.report import BREAKDOWNS, StepReport
-from flowborne.coupling.servo import Servo, ServoExact
 from flowborne.kernels.arrays import Array, Integers, Mask
+from flowborne.solids.trajectories import JointCommand, Servo, ServoExact
 
 if TYPE_CHECKING:
     from flowborne.coupling.world import World

@@ -16,9 +16,9 @@ import numpy as np
 from flowborne.control.executors import Mapper
 from flowborne.control.gradients import Gradient, OffsetPoses
 from flowborne.control.objectives import ObjectiveSum
-from flowborne.coupling.motion import JointCommand
 from flowborne.coupling.report import Outcome, StepReport
 from flowborne.kernels.arrays import Array, Integers
+from flowborne.solids.trajectories import JointCommand
 
 if TYPE_CHECKING:
     from flowborne.coupling.world import World

@@ -10,11 +10,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flowborne.coupling.motion import JointCommand
-from flowborne.coupling.servo import Servo
 from flowborne.kernels.arrays import Array, Integers, Mask
 from flowborne.solids.following import follow, outboard_dofs, rigidify
-from flowborne.solids.state import SolidState
+from flowborne.solids.model import SolidState
+from flowborne.solids.trajectories import JointCommand, Servo
 
 if TYPE_CHECKING:
     from flowborne.coupling.world import World

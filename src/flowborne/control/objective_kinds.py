@@ -33,11 +33,10 @@ from flowborne.control.objectives import OBJECTIVES, Objective, ObjectiveCallabl
 from flowborne.control.phases import PhaseTable
 from flowborne.control.python_function import with_parameters
 from flowborne.control.surroundings import Surroundings
-from flowborne.coupling.motion import Trajectory
 from flowborne.kernels.arrays import Array, Integers
 from flowborne.motion.tracks import Curve, TrajectoryConstant, TrajectoryKeyframes
-from flowborne.solids.joint_kinds import HINGE, JOINT_KINDS, SLIDE, joint_kind
-from flowborne.solids.model import SolidModel
+from flowborne.solids.model import HINGE, JOINT_KINDS, SLIDE, SolidModel, joint_kind
+from flowborne.solids.trajectories import Trajectory
 
 Direction = tuple[float, float, float]
 Names = Annotated[tuple[Text, ...], Field(min_length=1)]

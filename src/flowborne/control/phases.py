@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 
 from flowborne.base.tables import ByKind, Number, Positive, Table, Text
 from flowborne.control.surroundings import Surroundings
-from flowborne.coupling.motion import Trajectory
+from flowborne.solids.trajectories import Trajectory
 
 SLACK = 1e-9
 """A time less than this before a boundary, by rounding, has reached it, s."""

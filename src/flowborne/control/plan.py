@@ -19,8 +19,8 @@ from flowborne.control import creature
 from flowborne.control.course import Step, TrialError, advance
 from flowborne.control.measurement import Measurement
 from flowborne.control.objectives import ObjectiveSum
-from flowborne.coupling.servo import Servo
 from flowborne.kernels.arrays import Array, Integers
+from flowborne.solids.trajectories import Servo
 
 if TYPE_CHECKING:
     from flowborne.coupling.world import World

@@ -11,10 +11,9 @@ import numpy as np
 from flowborne.base.errors import SceneError
 from flowborne.base.phrases import suggestion
 from flowborne.control.python_function import with_parameters
-from flowborne.coupling.motion import Trajectory
 from flowborne.kernels.arrays import Integers
-from flowborne.solids.joint_kinds import joint_unit
-from flowborne.solids.model import SolidModel
+from flowborne.solids.model import SolidModel, joint_unit
+from flowborne.solids.trajectories import Trajectory
 
 
 @dataclass(frozen=True)

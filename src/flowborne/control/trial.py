@@ -17,8 +17,8 @@ from flowborne.control.course import Step, TrialError, advance
 from flowborne.control.measurement import Measurement
 from flowborne.control.objectives import ObjectiveSum
 from flowborne.coupling.bodies_step import advance_prescribed
-from flowborne.coupling.motion import JointCommand
 from flowborne.kernels.arrays import Array, Integers
+from flowborne.solids.trajectories import JointCommand
 
 if TYPE_CHECKING:
     from flowborne.coupling.world import World

@@ -10,10 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from flowborne.coupling.motion import JointCommand
+from flowborne.coupling.drives import joint_command
 from flowborne.coupling.operators import generalised, twists
 from flowborne.coupling.report import StepReport, timed
-from flowborne.coupling.servo import joint_command
 from flowborne.coupling.solve import solve_bodies
 from flowborne.coupling.step_report import report_bodies
 from flowborne.coupling.stream import winds_on
@@ -23,7 +22,8 @@ from flowborne.fluid.transport import parts_for
 from flowborne.solids.driven import Driven, drive
 from flowborne.solids.dynamics import kinematics
 from flowborne.solids.following import follow
-from flowborne.solids.state import SolidState
+from flowborne.solids.model import SolidState
+from flowborne.solids.trajectories import JointCommand
 
 
 def move_bodies(world: World, command: JointCommand, dt: float) -> None:

@@ -12,7 +12,6 @@ that which moves the sea, -rho x.dU/dt.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,9 +21,9 @@ from flowborne.coupling.flow import AdvectionResult
 from flowborne.coupling.operators import boundary_velocity, leak_proof
 from flowborne.coupling.world import Fluid, World
 from flowborne.fluid.grid import Array, Faces, faces_of
-from flowborne.fluid.induced import Normal, brought, induced
+from flowborne.fluid.potential import Normal, brought
 from flowborne.fluid.projection import accelerated
-from flowborne.fluid.sides.side import Place
+from flowborne.fluid.wake import induced
 from flowborne.solids.dynamics import kinematics
 
 
@@ -48,41 +47,31 @@ class FarField:
     ) -> AdvectionResult:
         """The fluid after advection where the sides have their velocity; what that took they gave.
 
+        Where the sea's velocity changes, its pressure acts at the end of the columns behind the
+        sides, so that a uniform flow changes alike.
+
         mass, opened  of the faces at the end of the step, kg and open parts
         """
-        if not self.normal:
+        grid, sea = fluid.grid, fluid.boundaries.sea(fluid.grid)
+        if sea is None:
             return advected
         velocity, stopped = faces_of([u.copy() for u in advected.velocity]), advected.stopped.copy()
         for place, across in self.normal.items():
             velocity[place.axis][place.layer] = across
         if self.gained.any():
-            rate = accelerated(opened, mass, fluid.grid, fluid.boundaries)
-            for place, pressure in self.beyond(fluid):
-                push = rate[place.axis][place.layer] * pressure
-                velocity[place.axis][place.layer] += push if not place.upper else -push
-        for place in far_places(fluid):
+            rate = accelerated(opened, mass, grid, fluid.boundaries)
+            for place in sea.far:
+                outward, at = 1.0 if place.upper else -1.0, list(place.cell_coordinates())
+                if place in self.normal:
+                    at[place.axis] = at[place.axis] - 0.5 * outward * grid.spacing
+                against = fluid.density * sum(x * u for x, u in zip(at, self.gained, strict=True))
+                velocity[place.axis][place.layer] += (
+                    outward * rate[place.axis][place.layer] * against
+                )
+        for place in sea.far:
             change = (velocity[place.axis] - advected.velocity[place.axis])[place.layer]
             stopped[place.axis] += float((mass[place.axis][place.layer] * change).sum())
         return replace(advected, velocity=velocity, stopped=stopped)
-
-    def beyond(self, fluid: Fluid) -> Iterator[tuple[Place, Array]]:
-        """Of each far side p dt of the sea's change at the end of the columns, Pa s, so that a
-        uniform flow changes alike."""
-        for place in far_places(fluid):
-            at = list(place.cell_coordinates())
-            if place in self.normal:
-                inside = -0.5 if place.upper else 0.5
-                at[place.axis] = at[place.axis] + inside * fluid.grid.spacing
-            yield (
-                place,
-                -fluid.density * sum(x * du for x, du in zip(at, self.gained, strict=True)),
-            )
-
-
-def far_places(fluid: Fluid) -> tuple[Place, ...]:
-    """Where the far sides of a domain in a sea are."""
-    sea = fluid.boundaries.sea(fluid.grid)
-    return () if sea is None else sea.far
 
 
 def far_field(world: World, start: Departure, dt: float) -> FarField:

@@ -23,55 +23,62 @@ from flowborne.solids.flesh import Flesh
 
 
 @dataclass(frozen=True)
-class Skins:
-    """The skin of every flesh at the nodes of the grid.
+class Piece:
+    """A body or flesh, or an image of it, on the grid.
 
-    flesh     (ni,) which flesh, once for each of its images that reaches the grid
-    box       (ni, 3, 2) node ranges around each
-    distance  signed distances to each at the nodes of its box, one image after the other, m;
-              flesh too thin to be watertight (`shapes.WATERTIGHT`) is seen as thick as that
-    start     (ni,) where those of each begin
-    crossings (ni,) where edges cross each; none of flesh that is seen thicker than it is
+    body       its number
+    grid       displaced such that the body itself is there
+    box        (3, 2) ranges of nodes
+    distance   to it at these nodes, m
+    crossings  of edges between them
+    """
+
+    body: int
+    grid: Grid
+    box: Integers
+    distance: Array
+    crossings: Crossings
+
+
+@dataclass(frozen=True)
+class Skins:
+    """The skin of every flesh.
+
+    pieces    once for each of its images that reaches the grid. Flesh too thin to be watertight
+              (`shapes.WATERTIGHT`) is seen as thick as that, and no edges cross it
     middle    (nf, 3) of the box around each flesh, m
     vertices  (n, 3) m;  triangles  (k, 3)
     """
 
-    flesh: Integers
-    box: Integers
-    distance: Array
-    start: Integers
-    crossings: tuple[Crossings, ...]
+    pieces: tuple[Piece, ...]
     middle: Array
     vertices: Array
     triangles: Integers
 
 
-def skins_on(grid: Grid, sides: Boundaries, flesh: Flesh | None, vertices: Array) -> Skins:
-    """The skins of flesh whose vertices are at `vertices` (n, 3)."""
+def skins_on(
+    grid: Grid, sides: Boundaries, flesh: Flesh | None, vertices: Array, bodies: int
+) -> Skins:
+    """The skins of flesh whose vertices are at `vertices` (n, 3), numbered after so many bodies."""
     if flesh is None:
-        none, no_corners = np.zeros(0, np.int64), np.zeros((0, 3), np.int64)
-        no_boxes = np.zeros((0, 3, 2), np.int64)
-        return Skins(none, no_boxes, np.zeros(0), none, (), np.zeros((0, 3)), vertices, no_corners)
+        return Skins((), np.zeros((0, 3)), vertices, np.zeros((0, 3), np.int64))
     thinnest = 2.0 * WATERTIGHT[grid.is_slab] * grid.spacing
-    fleshes, boxes, starts, distances, crossings, middles, first = [], [], [], [], [], [], 0
+    pieces, middles = [], []
     for f in range(len(flesh.names)):
         own = np.flatnonzero(flesh.of_surface == f)
         triangles = flesh.surface[own]
         inside = vertices[np.unique(triangles)]
         low, high = inside.min(axis=0), inside.max(axis=0)
         middles.append(0.5 * (low + high))
+        more = max(0.0, 0.5 * (thinnest - flesh.thickness[f]))
         for image in displaced(grid, sides, low, high):
             origin = np.array(image.origin)
             box = skin_box(inside, origin, grid.spacing, np.array(grid.shape))
             if grid.is_slab:
                 box[2] = 0, 2
             if np.any(box[:, 1] - box[:, 0] < 2):
-                box[:] = 0
+                continue
             phi = sample_skin(vertices, triangles, box, origin, grid.spacing, grid.is_slab, BAND)
-            fleshes.append(f)
-            boxes.append(box)
-            starts.append(first)
-            more = max(0.0, 0.5 * (thinnest - flesh.thickness[f]))
             found = new_crossings(phi, grid.spacing, grid.is_slab)
             if more == 0.0:
                 skin = vertices, triangles, flesh.sheets[own], -1 - f
@@ -79,19 +86,8 @@ def skins_on(grid: Grid, sides: Boundaries, flesh: Flesh | None, vertices: Array
                     found, np.zeros(1, np.int64), phi, *skin, box, origin, grid.spacing,
                     grid.is_slab,
                 )  # fmt: skip
-            crossings.append(found)
-            distances.append(phi.ravel() - more)
-            first += phi.size
-    return Skins(
-        np.array(fleshes),
-        np.array(boxes),
-        np.concatenate(distances),
-        np.array(starts),
-        tuple(crossings),
-        np.array(middles),
-        vertices,
-        flesh.surface,
-    )
+            pieces.append(Piece(bodies + f, grid, box, phi - more, found))
+    return Skins(tuple(pieces), np.array(middles), vertices, flesh.surface)
 
 
 def face_centres(axis: Integers, face: Integers, grid: Grid) -> tuple[Array, Integers]:

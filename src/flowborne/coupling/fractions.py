@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flowborne.coupling.flesh import Skins, face_centres, skin_at
+from flowborne.coupling.flesh import Piece, Skins, face_centres, skin_at
 from flowborne.coupling.images import Images, displaced, periods
 from flowborne.coupling.overlaps import handed_on
 from flowborne.coupling.shapes import Shapes
@@ -102,24 +102,6 @@ def beside_sides(shape: Integers, walls: Integers) -> Integers:
     return beside
 
 
-@dataclass(frozen=True)
-class Piece:
-    """A body or flesh, or an image of it, on the grid.
-
-    body       its number
-    grid       displaced such that the body itself is there
-    box        (3, 2) ranges of nodes
-    distance   to it at these nodes, m
-    crossings  of edges between them
-    """
-
-    body: int
-    grid: Grid
-    box: Integers
-    distance: Array
-    crossings: Crossings
-
-
 def around_bodies(
     shapes: Shapes,
     position: Array,
@@ -143,12 +125,7 @@ def around_bodies(
                 box[2] = 0, 2
             if np.all(box[:, 1] - box[:, 0] >= 2):
                 yield piece_of_body(int(body), shapes, placed, geoms, box, image)
-    for n, start in enumerate(skins.start):
-        box = np.ascontiguousarray(skins.box[n])
-        counts = box[:, 1] - box[:, 0]
-        phi = skins.distance[start : start + counts.prod()].reshape(counts)
-        if phi.size:
-            yield Piece(len(boxes) + int(skins.flesh[n]), grid, box, phi, skins.crossings[n])
+    yield from skins.pieces
 
 
 def piece_of_body(
@@ -287,7 +264,7 @@ def geometry(
     middles = np.concatenate([boxes.mean(axis=1), skins.middle])
     images = Images(periods(grid, boundaries), middles)
     place, index = face_centres(axis, face, grid)
-    first = int(np.searchsorted(part_body, first_skin)) if len(skins.start) else parts
+    first = int(np.searchsorted(part_body, first_skin))
     place[np.arange(first)[:, None], OTHER_AXES[axis[:first]]] += h * centre[:first]
     place = images.at_bodies(place, part_body)
     rows = bone_rows(bones, with_rows, grid)

@@ -102,7 +102,8 @@ def jet_of(mouth: Mouth, cut: Geometry, pose: Kinematics, v: Array, grid: Grid, 
     at = np.stack(np.unravel_index(cells, grid.shape), axis=1)
     skin = np.zeros(len(cells))
     np.add.at(skin, row, -cut.area[rows] @ along)
-    place = cut.images.at_bodies(places(at, 0.5, grid), np.full(len(at), mouth.body))
+    centres = np.array(grid.origin) + grid.spacing * (at + 0.5)
+    place = cut.images.at_bodies(centres, np.full(len(at), mouth.body))
     skin *= covered(place, mouth, centre, along, grid) * (skin > 0.0)
     here = skin > 0.0
     if not here.any():
@@ -128,14 +129,6 @@ def skin_of(mouth: Mouth, owner: Integers, bodies: int) -> Mask:
     """(n,) whether parts of skin belong to the mouth's body, or to flesh, which may be all around
     it; fleshes are numbered from `bodies` on."""
     return np.asarray((owner == mouth.body) | (owner >= bodies))
-
-
-def places(at: Integers, offset: Array | float, grid: Grid) -> Array:
-    """(n, 3) places in m at indices `at` (n, 3) plus `offset` cells; z = 0 in a slab."""
-    x = np.array(grid.origin) + grid.spacing * (at + offset)
-    if grid.is_slab:
-        x[:, 2] = 0.0
-    return x
 
 
 def covered(x: Array, mouth: Mouth, centre: Array, along: Array, grid: Grid) -> Array:

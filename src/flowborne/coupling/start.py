@@ -7,11 +7,11 @@ from numpy.typing import NDArray
 
 from flowborne.base.errors import BreakdownError
 from flowborne.coupling.bodies_step import parts_of, position_velocity
-from flowborne.coupling.motion import JointCommand
+from flowborne.coupling.drives import joint_command
 from flowborne.coupling.report import Outcome
-from flowborne.coupling.servo import joint_command
 from flowborne.coupling.step import step_part
 from flowborne.coupling.world import World
+from flowborne.solids.trajectories import JointCommand
 
 INSTANT = 1e-9
 """s of the step in which only impulses act."""

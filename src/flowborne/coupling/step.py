@@ -38,7 +38,8 @@ from flowborne.coupling.bodies_step import (
     position_velocity,
     step_bodies,
 )
-from flowborne.coupling.cut import cut_by_bodies, departure, jets_at
+from flowborne.coupling.cut import cut_by_bodies, departure, follow, jets_at
+from flowborne.coupling.drives import joint_command
 from flowborne.coupling.far_field import far_field
 from flowborne.coupling.flow import (
     advect,
@@ -47,16 +48,14 @@ from flowborne.coupling.flow import (
     store_state,
 )
 from flowborne.coupling.half_pressure import explicit_half_pressure
-from flowborne.coupling.motion import JointCommand
 from flowborne.coupling.operators import generalised
 from flowborne.coupling.report import Outcome, StepReport, joined, timed
-from flowborne.coupling.servo import joint_command
 from flowborne.coupling.solve import solve_together
 from flowborne.coupling.step_report import known_forces, report_coupled, report_failed
-from flowborne.coupling.window import follow
 from flowborne.coupling.world import World
 from flowborne.fluid.control_volumes import face_masses
 from flowborne.solids.dynamics import kinematics
+from flowborne.solids.trajectories import JointCommand
 
 
 def step(world: World, dt: float, command: JointCommand | None = None) -> StepReport:

@@ -284,8 +284,10 @@ class ViscousSystem:
         rhs = np.where(unknown, mass * start + given, 0.0)
         known = self.answer.to(self.push(np.where(unknown, 0.0, start), twist, blown))[0]
         np.add.at(rhs, walls.index, self.loose @ (self.at_walls(twist + known) + blown))
-        x, converged = self._conjugate_gradients(rhs, np.where(unknown, start, 0.0), tolerance)
-        result = np.where(unknown, x, start)
+        guess, right = np.where(unknown, start, 0.0), spread(self.scale * rhs)
+        y = spread(guess * np.sqrt(self.diagonal))
+        converged = conjugate_gradients(self.apply, right, y, tolerance, self.most)
+        result = np.where(unknown, self.scale * y.reshape(-1)[: start.size], start)
         change, impulse = self.answer.to(self.push(result, twist, blown))
         skin = self.at_walls(twist + change) + blown
         result[walls.index[walls.tied]] = skin[walls.tied]
@@ -303,12 +305,6 @@ class ViscousSystem:
         spin = twist[: 6 * bodies].reshape(bodies, 6)[:, 3:]
         push[: 6 * bodies].reshape(bodies, 6)[:, 3:] -= np.einsum("bij,bj->bi", self.couples, spin)
         return np.asarray(self.dt * push)
-
-    def _conjugate_gradients(self, rhs: Array, x: Array, tolerance: float) -> tuple[Array, bool]:
-        """Solution from the guess x, and whether the residual is within the tolerance."""
-        y, right = spread(x * np.sqrt(self.diagonal)), spread(self.scale * rhs)
-        converged = conjugate_gradients(self.apply, right, y, tolerance, self.most)
-        return self.scale * y.reshape(-1)[: x.size], converged
 
     def _split(self, values: Array, like: Faces) -> Faces:
         """Concatenated components as faces; periodic ends joined; a slab's z as it was."""

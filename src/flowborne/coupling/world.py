@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from flowborne.coupling.fractions import Geometry
-from flowborne.coupling.motion import NOTHING_TOLD, Told, Trajectory
 from flowborne.coupling.mouths import Mouth
 from flowborne.coupling.shapes import Shapes, shapes
 from flowborne.fluid.boundary import Boundaries, Source
@@ -18,8 +17,8 @@ from flowborne.fluid.grid import Array, Grid
 from flowborne.fluid.state import FluidState, under
 from flowborne.fluid.wake import wake_shape
 from flowborne.fluid.window import Window, crosses
-from flowborne.solids.model import SolidModel
-from flowborne.solids.state import SolidState
+from flowborne.solids.model import SolidModel, SolidState
+from flowborne.solids.trajectories import NOTHING_TOLD, Told, Trajectory
 from flowborne.solids.wind import Wind
 
 TRIAL_TOLERANCE = 1e-5

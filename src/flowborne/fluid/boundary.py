@@ -13,7 +13,7 @@ import numpy as np
 
 from flowborne.fluid.dipoles import Dipoles, dipoles_of
 from flowborne.fluid.grid import Grid
-from flowborne.fluid.sea import Sea, sea_of
+from flowborne.fluid.sides.far import Sea, sea_of
 from flowborne.fluid.sides.kinds import BoundaryClosed
 from flowborne.fluid.sides.side import Boundary, Place
 from flowborne.kernels.arrays import CLOSED, OPEN, PERIODIC, Integers, Marks

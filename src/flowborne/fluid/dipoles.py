@@ -42,21 +42,18 @@ class Dipoles:
 
     def answer(self, pressure: Array) -> Iterator[tuple[Place, Array]]:
         """E p of each side, from the pressure (nx, ny, nz) in the cells."""
-        near = pressure.reshape(-1)[self.cells]
-        return self._by_place((self.signs * (self.vectors @ near)) @ self.vectors)
-
-    def on(self, uncut: Sequence[Mask]) -> Dipoles:
-        """E between the faces of each side that `uncut` says alone."""
-        kept = np.concatenate([faces.reshape(-1) for faces in uncut])
-        return self if kept.all() else replace(self, vectors=self.vectors * kept)
-
-    def _by_place(self, values: Array) -> Iterator[tuple[Place, Array]]:
-        start = 0
+        near, start = pressure.reshape(-1)[self.cells], 0
+        values = (self.signs * (self.vectors @ near)) @ self.vectors
         for place in self.places:
             shape = [1 if a == place.axis else n for a, n in enumerate(place.grid.shape)]
             stop = start + int(np.prod(shape))
             yield place, values[start:stop].reshape(shape)
             start = stop
+
+    def on(self, uncut: Sequence[Mask]) -> Dipoles:
+        """E between the faces of each side that `uncut` says alone."""
+        kept = np.concatenate([faces.reshape(-1) for faces in uncut])
+        return self if kept.all() else replace(self, vectors=self.vectors * kept)
 
 
 def dipoles_of(sides: Sequence[tuple[Place, Boundary]]) -> Dipoles | None:

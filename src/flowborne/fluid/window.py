@@ -9,9 +9,9 @@ import numpy as np
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.ghosts import edge
 from flowborne.fluid.grid import Array, Faces, Grid, faces_of
-from flowborne.fluid.induced import after_move
 from flowborne.fluid.sides.side import Boundary, Place, tangential_change
 from flowborne.fluid.state import FluidState
+from flowborne.fluid.wake import after_move
 
 
 @dataclass(frozen=True)
@@ -55,21 +55,13 @@ def moved_fluid(
             pressure=shifted(state.pressure, axis, upper),
             previous_pressure=shifted(state.previous_pressure, axis, upper),
             cell_volume=shifted(state.cell_volume, axis, upper),
-            wake=wake_after_move(state, beyond.grid, grid, sides),
+            wake=after_move(state.wake, state.velocity, sides.sea(beyond.grid), sides.sea(grid)),
             scalars={
                 name: shifted(dye, axis, upper, _entering(name, side, place, time))
                 for name, dye in state.scalars.items()
             },
         )
     return state, grid
-
-
-def wake_after_move(state: FluidState, before: Grid, after: Grid, sides: Boundaries) -> Array:
-    """The wake beyond the exit of a domain in a sea, after the grid has moved by a cell."""
-    seas = sides.sea(before), sides.sea(after)
-    if state.wake.size == 0 or seas[0] is None or seas[1] is None:
-        return state.wake
-    return after_move(state.wake, state.velocity, seas[0], seas[1])
 
 
 def _entering(name: str, side: Boundary, place: Place, time: float) -> Array | float:

@@ -6,10 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from flowborne.base.errors import SceneError
-from flowborne.formats.creature import Array, Creature
+from flowborne.formats.creature import Array, Creature, quaternions, relative_to_parents
 from flowborne.motion.bvh import write_clip
 from flowborne.motion.clip import Clip
 from flowborne.runs.exporters import Written, provided
@@ -51,21 +50,16 @@ def _clip_of(creature: Creature) -> tuple[Clip, dict[str, Array]]:
     rest, parents = skeleton.rest[0], skeleton.parents
     rotation, _ = skeleton.carried
     offsets = rest - np.where(parents[:, None] < 0, rest, rest[parents])
-    of_parent = np.where((parents < 0)[None, :, None, None], np.eye(3), rotation[:, parents])
-    position = np.einsum(
-        "fnji,fnj->fni", of_parent, skeleton.position - skeleton.position[:, parents]
-    )
+    position, relative = relative_to_parents(parents, skeleton.position, rotation)
     slides = np.linalg.norm(position - offsets, axis=2).max(axis=0) > MIN_LENGTH * creature.size
     sliding = np.flatnonzero(slides & (parents >= 0))
-    relative = np.einsum("fnji,fnjk->fnik", of_parent, rotation)
-    quaternions = Rotation.from_matrix(relative.reshape(-1, 3, 3)).as_quat(scalar_first=True)
     clip = Clip(
         names=names,
         parents=parents,
         offsets=offsets,
         ends={names[bone]: end for bone, end in _ends(creature).items()},
         frame_time=1.0 / creature.run.frames_per_second,
-        rotations=quaternions.reshape(*relative.shape[:2], 4),
+        rotations=np.roll(quaternions(relative), 1, axis=-1),
         translation=skeleton.position[:, 0],
     )
     return clip, {names[joint]: position[:, joint] for joint in sliding}

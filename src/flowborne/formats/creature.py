@@ -5,10 +5,11 @@ Lengths are in m, in world axes with z up. The rest pose is the model's referenc
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from flowborne.base.errors import SceneError
 from flowborne.kernels.arrays import Array, Integers
@@ -18,7 +19,7 @@ from flowborne.scenes.bodies import load_model
 from flowborne.scenes.load import read_scene
 from flowborne.solids.dynamics import kinematics
 from flowborne.solids.model import BALL, HINGE, SolidModel
-from flowborne.solids.skins import clad_bodies, skins_of
+from flowborne.solids.skins import ModelSkin, clad_bodies, skins_of
 
 WORLD = "world"
 """Name of the bone of the world, if there is one."""
@@ -48,11 +49,11 @@ class Skeleton:
 
     def local(self) -> tuple[Array, Array]:
         """(frames, n, 3) m and (frames, n, 3, 3) of every bone in the frame of its parent."""
-        return _relative_to_parents(self.parents, self.position, self.rotation)
+        return relative_to_parents(self.parents, self.position, self.rotation)
 
     def rest_local(self) -> tuple[Array, Array]:
         """The same in the rest pose, (n, 3) m and (n, 3, 3)."""
-        return _relative_to_parents(self.parents, *self.rest)
+        return relative_to_parents(self.parents, *self.rest)
 
     @cached_property
     def carried(self) -> tuple[Array, Array]:
@@ -63,44 +64,26 @@ class Skeleton:
 
 
 @dataclass(frozen=True, eq=False)
-class Mesh:
-    """A surface of triangles in the rest pose.
+class Surface:
+    """A geometry in the rest pose.
 
-    name      of the geometry, <skin> or flesh
+    name      of the geometry
     vertices  (k, 3) m
     faces     (m, 3) vertices of each triangle, outward
     rgba      (4,) colour
+    bone      number of the bone that carries it, -1 if it is fixed to the world
     """
 
     name: str
     vertices: Array
     faces: Integers
     rgba: Array
-
-
-@dataclass(frozen=True, eq=False)
-class Surface(Mesh):
-    """A geometry.
-
-    bone  number of the bone that carries it, -1 if it is fixed to the world
-    """
-
     bone: int
 
 
 @dataclass(frozen=True, eq=False)
-class Bound(Mesh):
-    """A <skin> of the model: a surface bound to several bones.
-
-    weights  (k, n) weight of each bone for each vertex; rows sum to 1
-    """
-
-    weights: Array
-
-
-@dataclass(frozen=True, eq=False)
-class Skin(Bound):
-    """The surface of one flesh.
+class Skin(ModelSkin):
+    """The surface of one flesh in the rest pose, with weights (k, n) of the bones.
 
     chosen  (k,) its vertices in the `flesh_vertices` of a state
     """
@@ -159,12 +142,10 @@ class Creature:
         return tuple(found)
 
     @cached_property
-    def bound(self) -> tuple[Bound, ...]:
-        """The model's skins, which follow the bodies and do not affect the flow."""
-        return tuple(
-            Bound(skin.name, skin.vertices, skin.faces, skin.rgba, skin.weights[:, self._bodies])
-            for skin in skins_of(self.model.mj)
-        )
+    def bound(self) -> tuple[ModelSkin, ...]:
+        """The model's skins with weights (k, n) of the bones; they do not affect the flow."""
+        skins = skins_of(self.model.mj)
+        return tuple(replace(skin, weights=skin.weights[:, self._bodies]) for skin in skins)
 
     @cached_property
     def seen(self) -> tuple[Surface, ...]:
@@ -189,8 +170,8 @@ class Creature:
                         name,
                         flesh.rest[vertices],
                         np.searchsorted(vertices, triangles),
-                        SKIN_COLOUR,
                         flesh.carried[vertices][:, self._bodies],
+                        SKIN_COLOUR,
                         np.searchsorted(kept, vertices),
                     )
                 )
@@ -225,9 +206,13 @@ def has_bodies(run: OpenRun) -> bool:
     return not {"solids", "human"}.isdisjoint(run.scene)
 
 
-def _relative_to_parents(
-    parents: Integers, position: Array, rotation: Array
-) -> tuple[Array, Array]:
+def quaternions(rotation: Array) -> Array:
+    """(..., 4) x, y, z, w of rotations (..., 3, 3)."""
+    found = Rotation.from_matrix(rotation.reshape(-1, 3, 3)).as_quat()
+    return np.asarray(found.reshape(*rotation.shape[:-2], 4))
+
+
+def relative_to_parents(parents: Integers, position: Array, rotation: Array) -> tuple[Array, Array]:
     """Positions (..., n, 3) and rotations (..., n, 3, 3) in the parents' frames; roots stay."""
     local_position, local_rotation = position.copy(), rotation.copy()
     for bone, parent in enumerate(parents):

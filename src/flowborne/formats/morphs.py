@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flowborne.formats.creature import Array, Bound, Creature, Integers, Skeleton, Skin
+from flowborne.formats.creature import Array, Creature, Integers, Skin
 
 MIN_SINGULAR_VALUE = 1e-2
 """Singular value of a vertex's blended rotation below which targets do not act in its direction."""
@@ -43,8 +43,10 @@ def morphed(
     most        maximum number of targets
     tolerance   m, error below which no target is added
     """
-    bones, shares = strongest(skin, influences)
-    R, t = _blended(creature.skeleton, bones, shares)
+    bones, shares = strongest(skin.weights, influences)
+    R, t = creature.skeleton.carried
+    R = np.einsum("km,fkmij->fkij", shares, R[:, bones])  # of each vertex: x -> R x + t
+    t = np.einsum("km,fkmi->fki", shares, t[:, bones])
     wanted = creature.run.every("flesh_vertices")[:, skin.chosen]
     skinned = np.einsum("fkij,kj->fki", R, skin.vertices) + t
     inverse = np.linalg.pinv(R, rcond=MIN_SINGULAR_VALUE)
@@ -77,25 +79,15 @@ def _split_by_sign(column: Array, mode: Array) -> tuple[Array, Array]:
     return targets.reshape(-1, *mode.shape), weights.reshape(-1, len(column))
 
 
-def strongest(skin: Bound, most: int) -> tuple[Integers, Array]:
-    """The bones (k, m <= most) with the largest weights for each vertex, and these (k, m).
+def strongest(weights: Array, most: int) -> tuple[Integers, Array]:
+    """The bones (k, m <= most) with the largest weights (k, n) for each vertex, and these (k, m).
 
     The weights are scaled so that rows sum to 1.
     """
-    count = min(most, int((skin.weights > 0.0).sum(axis=1).max()))
-    bones = np.argsort(-skin.weights, axis=1, kind="stable")[:, :count]
-    shares = np.take_along_axis(skin.weights, bones, axis=1)
+    count = min(most, int((weights > 0.0).sum(axis=1).max()))
+    bones = np.argsort(-weights, axis=1, kind="stable")[:, :count]
+    shares = np.take_along_axis(weights, bones, axis=1)
     return bones, shares / shares.sum(axis=1, keepdims=True)
-
-
-def _blended(skeleton: Skeleton, bones: Integers, shares: Array) -> tuple[Array, Array]:
-    """(frames, k, 3, 3) R and (frames, k, 3) t, m, of the motion x -> R x + t of each vertex from
-    the rest pose: the weighted mean over its bones."""
-    R, t = skeleton.carried
-    return (
-        np.einsum("km,fkmij->fkij", shares, R[:, bones]),
-        np.einsum("km,fkmi->fki", shares, t[:, bones]),
-    )
 
 
 def _largest(distance: Array) -> float:

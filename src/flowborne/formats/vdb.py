@@ -12,10 +12,9 @@ import struct
 import zlib
 from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import partial
 from io import BytesIO
 from pathlib import Path
-from typing import BinaryIO, TypeVar
+from typing import TypeVar
 from uuid import NAMESPACE_URL, uuid5
 
 import numpy as np
@@ -57,16 +56,12 @@ class ExporterVdb:
     def write(self, run: OpenRun, path: Path) -> Written:
         if run.grid is None:
             raise SceneError(f"{run.folder} has no flow: {_without_flow(run)}.")
-        return Written(_write_states(run, path, velocity=True))
+        return Written(write_states(run, path, velocity=True))
 
 
-def write_dye(run: OpenRun, path: Path) -> tuple[Path, ...]:
-    """Write a file for each state, named like `path`, with the dyes alone; returns the files."""
-    return _write_states(run, path, velocity=False)
-
-
-def _write_states(run: OpenRun, path: Path, *, velocity: bool) -> tuple[Path, ...]:
-    """Write the dyes, and the velocity if asked for, of each state; returns the files."""
+def write_states(run: OpenRun, path: Path, *, velocity: bool) -> tuple[Path, ...]:
+    """Write a file for each state, named like `path`, with the dyes, and the velocity if asked for;
+    returns the files."""
     files = tuple(path.with_name(f"{path.stem}_{n:04d}{path.suffix}") for n in run.frames)
     for number, file in enumerate(files):
         state = run.state(number)
@@ -79,7 +74,7 @@ def _write_states(run: OpenRun, path: Path, *, velocity: bool) -> tuple[Path, ..
         if velocity:
             field, active = cell_velocity(grid, state), np.ones(grid.shape, bool)
             grids.append(VdbGrid("velocity", "unknown", field, active, grid.spacing, (x, y, z)))
-        write_atomically(file, partial(_write_grids, grids), durable=False)
+        _write_file(file, grids)
     return files
 
 
@@ -113,8 +108,8 @@ class VdbGrid:
     first: tuple[float, float, float]
 
 
-def _write_grids(grids: Iterable[VdbGrid], file: BinaryIO) -> None:
-    file.write(vdb_bytes(grids))
+def _write_file(path: Path, grids: Iterable[VdbGrid]) -> None:
+    write_atomically(path, lambda file: file.write(vdb_bytes(grids)), durable=False)
 
 
 def vdb_bytes(grids: Iterable[VdbGrid]) -> bytes:

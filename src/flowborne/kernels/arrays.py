@@ -1,4 +1,4 @@
-"""Types of the arrays that kernels take, and their precision."""
+"""Types of arrays, for kernels and all others, and their precision."""
 
 from __future__ import annotations
 
@@ -22,6 +22,14 @@ Real = NDArray[np.floating]
 
 Triple = tuple[Real, Real, Real]
 """One array per axis."""
+
+Single = NDArray[np.float32]
+Complex = NDArray[np.complex128]
+Kinds = NDArray[np.int8]
+Pixels = NDArray[np.uint8]
+
+Mesh = tuple[Array, Integers]
+"""Vertices (k, 3) and faces (m, 3), outward by the right-hand rule."""
 
 Periodic = NDArray[np.uint8]
 """(3,) 1 for axes that are periodic."""

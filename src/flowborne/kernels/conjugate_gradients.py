@@ -1,6 +1,6 @@
 """Conjugate gradients on K + J A^-1 J^T, preconditioned by one V-cycle on K and a deflation.
 
-With Y = V B and C = (1 + B^T Y)^-1 R^T (see `solvers.deflation`) the preconditioned residual r is
+With Y = V B and C = (1 + B^T Y)^-1 R^T (see `solvers.pressure`) the preconditioned residual r is
 V r - Y (C J^T V r). All vectors are padded (see `levels`).
 """
 
@@ -154,9 +154,9 @@ def solve(
                vectors, x as well at the end
     rows       of J with padded flat cells; mobility: A^-1 (see `solvers.mobility`)
     beyond     what belongs to K besides: padded flat cells, vectors, strengths; see `add_term`
-    null       see `solvers.deflation.null_basis`
+    null       see `solvers.pressure.null_basis`
     fields, amounts  of the modes in the preconditioner, at the scale of the hierarchy; see
-               `solvers.deflation`
+               `solvers.pressure`
     returns    iterations, |rhs - A x| / |rhs|, whether the residual asked for was reached
     """
     table, periodic = hierarchy[0], hierarchy[1]

@@ -29,16 +29,6 @@ def scaled(source: Real, target: Real, scale: float) -> None:
         b[n] = scale * a[n]
 
 
-@kernel
-def scaled_cells(source: Real, target: Real, scale: float) -> None:
-    """target = scale x source, in target's precision; ghosts of target are left alone."""
-    d = 1 if source.shape[0] > 1 else 0
-    for i in prange(source.shape[0] - 2 * d):
-        for j in range(1, source.shape[1] - 1):
-            for k in range(1, source.shape[2] - 1):
-                target[i + d, j, k] = scale * source[i + d, j, k]
-
-
 @inlined
 def in_order(parts: Array) -> float:
     """Sum, first to last."""

@@ -54,32 +54,19 @@ ZXY = (2, 0, 1)
 """Axes of the rotation channels in clips without an original file."""
 
 
-def read_bvh(path: str | Path, unit: float = 1.0, up: str = "y", skip: int = 0) -> Clip:
-    """The motion of a BVH file.
-
-    unit    m per length of the file
-    up      up axis of the file, one of TO_WORLD
-    skip    frames to drop at the start, such as the T-pose of an exporter
-    raises  SceneError when the file is missing, not BVH, truncated or not finite, when a bone
-            changes its length by more than 1 mm, and when `skip` leaves no frame
-    note    position channels of the root give its position without its OFFSET. A root with a single
-            child that moves relative to it is merged into that child
-    """
-    bvh = load_bvh(Path(path))
-    clip = clip_of(bvh, unit, up, skip)
-    check_rigid(bvh, clip, clip.names)
-    return clip
-
-
 def clip_of(
     bvh: BvhFile, unit: float = 1.0, up: str = "y", skip: int = 0, root: str | None = None
 ) -> Clip:
     """The motion of a loaded BVH file, with rigid bones.
 
+    unit    m per length of the file
+    up      up axis of the file, one of TO_WORLD
+    skip    frames to drop at the start, such as the T-pose of an exporter
     root    first joint of the clip: the joints above are merged into it, and their other branches
             are dropped. By default the root of the file, or the first joint below it that does not
             move relative to a joint with a single child
     raises  SceneError when `skip` leaves no frame
+    note    position channels of the root give its position without its OFFSET
     """
     if not 0 <= skip < len(bvh.values):
         raise SceneError(
@@ -150,7 +137,7 @@ def write_bvh(
                the angles of the file
     root       a joint with position channels, and its (frames, 3) positions, m, and (frames, 4)
                rotations in the world
-    unit, up   as in `read_bvh`
+    unit, up   as in `clip_of`
     first      first frame of the file to write, counting skipped ones
     last       frame after the last one; the end of the file by default
     raises     SceneError when the file is invalid, lacks a joint or a channel, or has no frame in

@@ -270,10 +270,23 @@ def load_bvh(path: Path) -> BvhFile:
     text, encoding = _decoded(raw)
     lines = text.splitlines()
     joints, after = read_hierarchy(lines, str(path))
-    frames, time_text, frame_time, after_header, at = _motion_header(lines, after, str(path))
-    hierarchy = "".join(text.splitlines(keepends=True)[:at])
-    bvh = BvhFile(str(path), encoding, hierarchy, joints, time_text, frame_time)
-    _read_rows(bvh, lines, after_header, frames)
+    filled = [n for n in range(after, len(lines)) if lines[n].strip()][:2]
+    if len(filled) < 2:
+        raise SceneError(f"{path} ends after MOTION: it is cut. Export it again.")
+    head, second = filled
+    count = re.fullmatch(r"\s*Frames\s*:\s*(\d+)\s*", lines[head], re.IGNORECASE)
+    if count is None:
+        raise SceneError(f"{path}, line {head + 1}: not 'Frames: ' and a number. Correct the file.")
+    given = re.fullmatch(r"\s*Frame\s*Time\s*:\s*(\S+)\s*", lines[second], re.IGNORECASE)
+    time = number_in(given[1]) if given else math.nan
+    if given is None or not (math.isfinite(time) and time > 0.0):
+        raise SceneError(
+            f"{path}, line {second + 1}: '{lines[second].strip()}' gives no frame time above 0 s. "
+            "Give one, such as 'Frame Time: 0.008333'."
+        )
+    hierarchy = "".join(text.splitlines(keepends=True)[:head])
+    bvh = BvhFile(str(path), encoding, hierarchy, joints, given[1], time)
+    _read_rows(bvh, lines, second + 1, int(count[1]))
     return bvh
 
 
@@ -284,25 +297,6 @@ def _decoded(raw: bytes) -> tuple[str, str]:
         return raw.decode(encoding), encoding
     except UnicodeDecodeError:
         return raw.decode("latin-1"), "latin-1"
-
-
-def _motion_header(lines: list[str], after: int, name: str) -> tuple[int, str, float, int, int]:
-    """Frames, frame time as text and in s, lines before the first frame, lines before 'Frames'."""
-    filled = [n for n in range(after, len(lines)) if lines[n].strip()][:2]
-    if len(filled) < 2:
-        raise SceneError(f"{name} ends after MOTION: it is cut. Export it again.")
-    head, second = filled
-    count = re.fullmatch(r"\s*Frames\s*:\s*(\d+)\s*", lines[head], re.IGNORECASE)
-    if count is None:
-        raise SceneError(f"{name}, line {head + 1}: not 'Frames: ' and a number. Correct the file.")
-    given = re.fullmatch(r"\s*Frame\s*Time\s*:\s*(\S+)\s*", lines[second], re.IGNORECASE)
-    time = number_in(given[1]) if given else math.nan
-    if given is None or not (math.isfinite(time) and time > 0.0):
-        raise SceneError(
-            f"{name}, line {second + 1}: '{lines[second].strip()}' gives no frame time above 0 s. "
-            "Give one, such as 'Frame Time: 0.008333'."
-        )
-    return int(count[1]), given[1], time, second + 1, head
 
 
 def _read_rows(bvh: BvhFile, lines: list[str], after: int, frames: int) -> None:

@@ -45,6 +45,14 @@ class Clip:
         """s from the first frame to the last."""
         return (self.frames - 1) * self.frame_time
 
+    @property
+    def rest(self) -> Array:
+        """(n, 3) m, positions of the joints with all rotations zero and the root at the origin."""
+        positions = self.offsets.copy()
+        for joint, parent in enumerate(self.parents[1:], start=1):
+            positions[joint] += positions[parent]
+        return positions
+
     def rotation_steps(self) -> Array:
         """(frames - 1, n) rotation angle of each joint from a frame to the next, rad."""
         same = np.abs(np.einsum("fnk,fnk->fn", self.rotations[1:], self.rotations[:-1]))

@@ -1,4 +1,4 @@
-"""A clip as the prescribed motion of many joints (`coupling.motion.Trajectory`)."""
+"""A clip as the prescribed motion of many joints (`solids.trajectories.Trajectory`)."""
 
 from __future__ import annotations
 

@@ -101,11 +101,12 @@ def standing_axis(up: Array, read_as: str) -> str | None:
 class Capture:
     """A clip and its interpretation.
 
-    clip      the motion; for a human, relative to a standing pose mapping   joint of the model ->
-    joint of the clip skeleton  of the human with the clip's bones; None in a scene without [human]
-    unit, up  m per length of the file, and its up axis rest      (n, 4) rotations of the joints in
-    the reference pose, relative to the zeros of the file;
-              None if the zeros are the reference
+    clip      the motion; for a human, relative to a standing pose
+    mapping   joint of the model -> joint of the clip
+    skeleton  of the human with the clip's bones; None in a scene without [human]
+    unit, up  m per length of the file, and its up axis
+    rest      (n, 4) rotations of the joints in the reference pose, relative to the zeros of the
+              file; None if the zeros are the reference
     posture   (3,) the person's mean direction from ankles to shoulders, z up; None without [human]
     lift      (frames,) height added to the root of the file, m, or None
     held      joints of the human that the file lacks
@@ -138,7 +139,8 @@ class Reading:
     skip     frames to drop at the start of the file
     mapping  joint of the model -> joint of the clip, in pairs
     floor    "soles" to put the soles of a person on the floor
-    mass     mass of a person, kg;  sex  for the proportions of a person
+    mass     of a person, kg
+    sex      for the proportions of a person
     """
 
     unit: float | None
@@ -178,12 +180,12 @@ def _person(path: Path, stamp: tuple[int, int], how: Reading) -> Capture:
     length = leg_length(raw, mapping)
     unit = likely_unit(length) if how.unit is None else how.unit
     check_scale(length, unit)
-    up = how.up or standing_axis(posture_of(raw, mapping).up, "y") or "y"
+    up = how.up or standing_axis(posture_of(raw, mapping)[1], "y") or "y"
     clip = clip_of(bvh, unit, up, how.skip, mapping["root"])
     used = {number for joint in mapping.values() for number in clip.lineage(joint)} - {0}
     check_rigid(bvh, clip, sorted(clip.names[n] for n in used), MAX_PERSON_STRETCH)
-    posture = posture_of(clip, mapping)
-    clip = relative_to_pose(clip, posture.rest)
+    rest, posture = posture_of(clip, mapping)
+    clip = relative_to_pose(clip, rest)
     skeleton = skeleton_of(clip, mapping, between(clip, mapping))
     links = {link.name: link.bone for links in skeleton.links.values() for link in links}
     height = clip.translation[:, 2]
@@ -195,8 +197,8 @@ def _person(path: Path, stamp: tuple[int, int], how: Reading) -> Capture:
         skeleton,
         unit,
         up,
-        rest=posture.rest,
-        posture=posture.up,
+        rest=rest,
+        posture=posture,
         lift=clip.translation[:, 2] - height,
         held=tuple(joint for joint in JOINTS if joint not in mapping),
         note=bvh.note,

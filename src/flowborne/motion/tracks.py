@@ -1,4 +1,4 @@
-"""Prescribed motions of a joint as functions of time (`coupling.motion.Trajectory`)."""
+"""Prescribed motions of a joint as functions of time (`solids.trajectories.Trajectory`)."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from scipy.interpolate import PchipInterpolator
 
 from flowborne.kernels.arrays import Array, Integers
 from flowborne.motion.formula import Formula
-from flowborne.solids.model import SolidModel
 
 SPEED_SAMPLES = 200
 """Number of times in a run at which the speed of a motion is evaluated."""
@@ -144,41 +143,3 @@ class TrajectoryFormula:
     def velocity(self, time: float) -> Array:
         """(1,) rad/s or m/s."""
         return np.array([self.unit * self.formula.at(time).slope])
-
-
-@dataclass(frozen=True, eq=False)
-class TrajectoryKnots:
-    """Joints that go from pose to pose at even velocities and are in each at its time.
-
-    dofs   (k,) of the joints
-    times  (n,) s, ascending; n at least 2
-    poses  (n, nq), whose other joints do not matter
-    """
-
-    model: SolidModel
-    dofs: Integers
-    times: Array
-    poses: Array
-
-    def position(self, time: float) -> Array:
-        """(m,) entries of q; beyond both ends the joints keep their velocity."""
-        knot = self._knot(time)
-        pose = self.poses[knot]
-        if time != self.times[knot]:
-            pose = self.model.integrate(pose, self._velocity(knot), time - self.times[knot])
-        return pose[self.model.indices_of(self.dofs)]
-
-    def velocity(self, time: float) -> Array:
-        """(k,) entries of v."""
-        return self._velocity(self._knot(time))[self.dofs]
-
-    def _knot(self, time: float) -> int:
-        """The last one at or before `time`."""
-        before = int(np.searchsorted(self.times, time, side="right")) - 1
-        return min(max(before, 0), len(self.times) - 1)
-
-    def _velocity(self, knot: int) -> Array:
-        """(nv,) after a knot."""
-        knot = min(knot, len(self.times) - 2)
-        here, there = self.poses[knot : knot + 2]
-        return self.model.difference(here, there) / (self.times[knot + 1] - self.times[knot])

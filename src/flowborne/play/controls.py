@@ -11,8 +11,7 @@ import numpy as np
 from flowborne.base.phrases import and_more
 from flowborne.play.groups import Group
 from flowborne.scenes.schema import Scene
-from flowborne.solids.joint_kinds import SLIDE, joint_kind
-from flowborne.solids.model import SolidModel
+from flowborne.solids.model import SLIDE, SolidModel, joint_kind
 
 Settings = Mapping[str, float | str]
 """Name of a control -> its value."""

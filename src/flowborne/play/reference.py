@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.coupling.motion import Trajectory
 from flowborne.coupling.world import Setup
 from flowborne.kernels.arrays import Array
 from flowborne.scenes.bodies import initial_state
@@ -16,6 +15,7 @@ from flowborne.scenes.capture import capture_of, clip_motion
 from flowborne.scenes.schema import Scene
 from flowborne.solids.dynamics import kinematics
 from flowborne.solids.model import SolidModel
+from flowborne.solids.trajectories import Trajectory
 
 
 @dataclass(frozen=True, eq=False)

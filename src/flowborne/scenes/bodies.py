@@ -10,7 +10,6 @@ import numpy as np
 
 from flowborne.base.errors import SceneError
 from flowborne.base.phrases import suggestion
-from flowborne.coupling.motion import Trajectory
 from flowborne.fluid.grid import Array
 from flowborne.scenes.capture import clip_motion, human_of, pose_controlled
 from flowborne.scenes.draft import Draft
@@ -20,22 +19,22 @@ from flowborne.scenes.holding import held
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.schema_bodies import SolidsTable
 from flowborne.solids import mjcf
-from flowborne.solids.compiler import MjModel, MjSpec, compiled_quietly
 from flowborne.solids.displacing import Displace
 from flowborne.solids.following import follow, posed_flesh
 from flowborne.solids.geoms import floors
-from flowborne.solids.joint_kinds import (
+from flowborne.solids.mjcf import Given, MjModel, MjSpec, compiled_quietly
+from flowborne.solids.model import (
     BALL,
     FREE,
     HINGE,
     JOINT_KINDS,
     SLIDE,
+    SolidModel,
+    SolidState,
     joint_kind,
     joint_unit,
 )
-from flowborne.solids.mjcf import Given
-from flowborne.solids.model import SolidModel
-from flowborne.solids.state import SolidState
+from flowborne.solids.trajectories import Trajectory
 
 
 def load_model(scene: Scene) -> SolidModel:

@@ -20,8 +20,7 @@ from flowborne.scenes.fluid import check_dimensions, check_fluid, fluid_of
 from flowborne.scenes.motions import MotionFormulaTable, check_formulas, check_motions
 from flowborne.scenes.mouths import check_mouth_cells, check_mouths
 from flowborne.scenes.window import check_followed
-from flowborne.solids.joint_kinds import FREE, HINGE, SLIDE, joint_kind, joint_unit
-from flowborne.solids.model import SolidModel
+from flowborne.solids.model import FREE, HINGE, SLIDE, SolidModel, joint_kind, joint_unit
 from flowborne.solids.surfaces import geom_boxes
 
 FLOAT32_ROUNDING = float(np.finfo(np.float32).eps)

@@ -16,13 +16,12 @@ from flowborne.control.phases import PhaseAlways
 from flowborne.control.plan import Horizon
 from flowborne.control.surroundings import Surroundings
 from flowborne.control.trial import Hypothesis
-from flowborne.coupling.motion import Trajectory
 from flowborne.scenes.control import ControllerTable
 from flowborne.scenes.draft import Draft
 from flowborne.scenes.motions import out_of_plane
 from flowborne.scenes.schema import Scene
-from flowborne.solids.joint_kinds import FREE, joint_kind
-from flowborne.solids.model import SolidModel
+from flowborne.solids.model import FREE, SolidModel, joint_kind
+from flowborne.solids.trajectories import Trajectory
 
 
 def controller_of(scene: Scene, around: Surroundings, executor: Mapper) -> Controller:

@@ -14,10 +14,9 @@ from pydantic import Field, model_validator
 from flowborne.base.tables import FileName, NotNegative, Places, PlainName, Positive, Table, Text
 from flowborne.scenes.domain import Domain
 from flowborne.scenes.sides import BoundariesTable
-from flowborne.solids.compiler import MjSpec
 from flowborne.solids.dynamics import kinematics
-from flowborne.solids.model import SolidModel
-from flowborne.solids.state import SolidState
+from flowborne.solids.mjcf import MjSpec
+from flowborne.solids.model import SolidModel, SolidState
 from flowborne.solids.tissue.bones import digest
 from flowborne.solids.tissue.growth import Grown, Law, Tissue, add_flesh
 from flowborne.solids.tissue.mesh import (

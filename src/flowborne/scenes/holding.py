@@ -9,12 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.coupling.motion import Trajectory
-from flowborne.coupling.servo import Servo, ServoExact, ServoPD, driven
 from flowborne.fluid.grid import Array
 from flowborne.scenes.schema import Scene
 from flowborne.solids.actuators import actuators
 from flowborne.solids.model import BALL, HINGE, SLIDE, SolidModel
+from flowborne.solids.trajectories import Servo, ServoExact, ServoPD, Trajectory, driven
 
 
 @dataclass(frozen=True)

@@ -24,8 +24,7 @@ from flowborne.scenes.capture import capture_of, followers
 from flowborne.scenes.load import load_scene
 from flowborne.scenes.schema import Scene
 from flowborne.solids.dynamics import kinematics
-from flowborne.solids.joint_kinds import FREE, joint_kind
-from flowborne.solids.model import SolidModel
+from flowborne.solids.model import FREE, SolidModel, joint_kind
 
 
 def export_bvh(run: Path, path: Path) -> str:

@@ -23,8 +23,6 @@ from flowborne.base.tables import (
     check_keyframes,
 )
 from flowborne.control.surroundings import Surroundings
-from flowborne.coupling.motion import Trajectory
-from flowborne.coupling.servo import ServoExact, ServoPD, driven
 from flowborne.fluid.grid import Array
 from flowborne.motion.formula import RESERVED, Formula
 from flowborne.motion.tracks import (
@@ -34,8 +32,8 @@ from flowborne.motion.tracks import (
     TrajectoryKeyframes,
     TrajectorySinusoid,
 )
-from flowborne.solids.joint_kinds import HINGE, JOINT_KINDS, SLIDE, joint_kind, joint_unit
-from flowborne.solids.model import SolidModel
+from flowborne.solids.model import HINGE, JOINT_KINDS, SLIDE, SolidModel, joint_kind, joint_unit
+from flowborne.solids.trajectories import ServoExact, ServoPD, Trajectory, driven
 
 Indices = NDArray[np.int64]
 

@@ -17,8 +17,7 @@ from flowborne.fluid.sides.far import Strength
 from flowborne.motion.formula import Formula
 from flowborne.motion.inflow import FactorFormula, FactorPulse, FactorSteady
 from flowborne.scenes.factors import FactorsTable
-from flowborne.solids.model import SolidModel
-from flowborne.solids.state import SolidState
+from flowborne.solids.model import SolidModel, SolidState
 
 
 class PulseTable(Table):

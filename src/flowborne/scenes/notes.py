@@ -24,12 +24,11 @@ from flowborne.scenes.earlier import earlier_of
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.schema_bodies import SolidsTable
 from flowborne.scenes.window import window_notes
-from flowborne.solids.compiler import MjSpec
 from flowborne.solids.geoms import floors
-from flowborne.solids.joint_kinds import HINGE, SLIDE, joint_kind, joint_unit
 from flowborne.solids.mending import joined_pairs, mended_meshes
-from flowborne.solids.model import SolidModel
-from flowborne.solids.options import bodies_with_own_inertia, disabled_parts, replaced_options
+from flowborne.solids.mjcf import MjSpec
+from flowborne.solids.model import HINGE, SLIDE, SolidModel, joint_kind, joint_unit
+from flowborne.solids.model_checks import bodies_with_own_inertia, disabled_parts, replaced_options
 
 
 def notes_of(scene: Scene, model: SolidModel) -> Iterator[str]:

@@ -8,8 +8,14 @@ from typing import Annotated, ClassVar, Literal
 
 from flowborne.base.tables import ByKind, Places, Table, Vector, triple
 from flowborne.fluid.grid import Array, Grid
-from flowborne.fluid.sea import stream_problem
-from flowborne.fluid.sides.far import CHANNEL, ONE_SEA, BoundaryFar, centre_among, in_channel
+from flowborne.fluid.sides.far import (
+    CHANNEL,
+    ONE_SEA,
+    BoundaryFar,
+    centre_among,
+    in_channel,
+    stream_problem,
+)
 from flowborne.fluid.sides.kinds import (
     BoundaryClosed,
     BoundaryInflow,

@@ -32,7 +32,7 @@ from flowborne.scenes.warn_bodies import (
     thin_bodies,
 )
 from flowborne.scenes.warn_speed import fast_bodies, fast_flow, unlike_the_sea
-from flowborne.solids.joint_kinds import SLIDE, joint_kind, joint_unit
+from flowborne.solids.model import SLIDE, joint_kind, joint_unit
 
 LEAST_STRENGTH = 2.0 * math.pi
 """Degrees/s. Whoever types radians for anything up to a turn a second types less than this; in

@@ -18,7 +18,7 @@ from flowborne.motion.tracks import SPEED_SAMPLES
 from flowborne.scenes.bodies import initial_state
 from flowborne.scenes.holding import driven_dofs
 from flowborne.scenes.schema import Scene
-from flowborne.solids.joint_kinds import joint_unit
+from flowborne.solids.model import joint_unit
 from flowborne.solids.surfaces import Outline
 
 BODY_CELLS = 1.0

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from flowborne.base.phrases import listed
-from flowborne.coupling.window import following
+from flowborne.coupling.cut import following
 from flowborne.coupling.world import Fluid
 from flowborne.fluid.grid import Array
 from flowborne.fluid.window import crosses

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull, QhullError
 
 from flowborne.shapes.mesh import welded
 from flowborne.shapes.shape import Array, Integers, Mesh
-from flowborne.shapes.thickness import outward
+from flowborne.shapes.thickness import connected, outward
 
 SMALL_HOLE = 0.05
 """Largest hole, relative to the size of the surface, that is closed by default: open seams, the
@@ -104,8 +102,7 @@ def wound(faces: Integers) -> Integers:
     first, second = (between % count).T
     start = np.concatenate([first, first + count])
     stop = np.concatenate([second + count * alike, second + count * ~alike])
-    links = coo_array((np.ones(len(start)), (start, stop)), shape=(2 * count, 2 * count))
-    part = np.asarray(connected_components(links, directed=False)[1])
+    part = connected(2 * count, start, stop)
     kept = np.bincount(part[:count], minlength=part.max() + 1)
     flipped = kept[part[count:]] > kept[part[:count]]
     return np.where(flipped[:, None], faces[:, ::-1], faces)

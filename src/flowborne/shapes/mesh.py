@@ -5,8 +5,6 @@ from __future__ import annotations
 from functools import cached_property
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from flowborne.kernels.distance import MESH
 from flowborne.kernels.node_distance import BAND
@@ -25,7 +23,7 @@ from flowborne.shapes.shape import (
     lattice,
     unit,
 )
-from flowborne.shapes.thickness import outward, split_quads, thin_parts, thinnest
+from flowborne.shapes.thickness import connected, outward, split_quads, thin_parts, thinnest
 
 UNDETERMINED_BELOW = 0.02
 """Largest mean square of the normals along a direction for which they do not determine the motion
@@ -255,8 +253,7 @@ def smooth_sheets(vertices: Array, faces: Integers) -> Integers:
     normals, adjacent = unit(outward(vertices[faces])), neighbours(faces)
     smooth = np.einsum("tei,ti->te", normals[adjacent], normals) > SMOOTH_COSINE
     one, edge = np.nonzero(smooth)
-    links = coo_array((np.ones(one.size), (one, adjacent[one, edge])), shape=(len(faces),) * 2)
-    return np.asarray(connected_components(links, directed=False)[1], np.int64)
+    return connected(len(faces), one, adjacent[one, edge]).astype(np.int64)
 
 
 def welded(vertices: Array, faces: Integers) -> Mesh:

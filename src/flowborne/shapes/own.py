@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -160,7 +160,12 @@ def triangulated(geometry: OwnGeometry) -> Mesh:
         raise PartError(f"{what} reaches beyond its half extents {half} m: make them larger")
     facets = allow_for_curvature(distance.reshape(counts), pitch)
     box = pv.ImageData(dimensions=counts, spacing=(pitch,) * 3, origin=corner)
-    box.point_data["distance"] = facets.ravel(order="F")
-    surface = box.contour([0.0], scalars="distance", method="flying_edges")
+    return level_surface(box, facets.ravel(order="F"), 0.0)
+
+
+def level_surface(box: Any, distance: Array, level: float) -> Mesh:
+    """Closed outward surface where the distance (n,) at the points of a lattice is `level`."""
+    box.point_data["distance"] = distance
+    surface = box.contour([level], scalars="distance", method="flying_edges")
     inward = surface.regular_faces.astype(np.int64)
     return np.asarray(surface.points, dtype=np.float64), inward[:, ::-1]

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from flowborne.kernels.arrays import Array, Integers, Mask
@@ -122,6 +124,12 @@ def across(normal: Array) -> Mask:
 def split_quads(a: Integers, b: Integers, c: Integers, d: Integers) -> Integers:
     """(2 k, 3) triangles a b c, then a c d, of quadrangles with corners (k,) in order."""
     return np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+
+
+def connected(count: int, one: Integers, other: Integers) -> Integers:
+    """(count,) number of the connected part of each item; `one` and `other` (k,) are linked."""
+    links = coo_array((np.ones(len(one)), (one, other)), shape=(count, count))
+    return np.asarray(connected_components(links, directed=False)[1])
 
 
 def outward(facets: Array) -> Array:

@@ -15,7 +15,6 @@ from threadpoolctl import ThreadpoolController
 
 from flowborne.base.errors import PartError, SceneError, described
 from flowborne.control.commands import Commands, Drives, drives_of, told_by
-from flowborne.coupling.motion import NOTHING_TOLD
 from flowborne.coupling.report import BREAKDOWNS, Outcome, StepReport
 from flowborne.coupling.stream import FlowState, flow_at
 from flowborne.coupling.world import Setup, World
@@ -30,12 +29,13 @@ from flowborne.solids.flesh import inversion
 from flowborne.solids.model import FREE, SLIDE
 from flowborne.solids.sensed import BodyState, JointState
 from flowborne.solids.surfaces import geom_boxes
+from flowborne.solids.trajectories import NOTHING_TOLD
 
 if TYPE_CHECKING:
     from flowborne.control.controller import Controller
-    from flowborne.coupling.motion import JointCommand
     from flowborne.scenes.schema import Scene
     from flowborne.solids.model import SolidModel
+    from flowborne.solids.trajectories import JointCommand
 
 Step = Callable[[World, float, "JointCommand | None"], StepReport]
 
@@ -282,8 +282,8 @@ class Simulation:
 
     def _start(self) -> None:
         """Start bodies and fluid; controlled joints keep their velocity until a decision."""
-        from flowborne.coupling.motion import JointCommand
         from flowborne.coupling.start import start
+        from flowborne.solids.trajectories import JointCommand
 
         world, scene = self._moment.world, self.scene
         model = world.setup.solid

@@ -10,7 +10,7 @@ The choice is written into the groups of the geoms: afterwards, geoms below HIDD
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 
@@ -72,7 +72,10 @@ def chosen_geoms(spec: mujoco.MjSpec, mj: mujoco.MjModel, displace: Displace) ->
     without = [_found(names, key, "name") for key in displace.without]
     classed = [_found(classes, key, "class") for key in displace.classes]
     grouped = [_found(groups, str(key), "group") for key in displace.groups]
-    by_rule = [_of_body(mj, own) for own in _by_body(mj, names)] if displace.by_rule else []
+    by_body: dict[int, list[int]] = {}
+    for g in names:
+        by_body.setdefault(int(mj.geom_bodyid[g]), []).append(g)
+    by_rule = [_of_body(mj, own) for own in by_body.values()] if displace.by_rule else []
     chosen = set[int]().union(*named, *classed, *grouped, *by_rule)
     return chosen.difference(*without)
 
@@ -101,13 +104,6 @@ def _found(values: Mapping[int, str], pattern: str, what: str) -> set[int]:
         known = listed(list(dict.fromkeys(values.values()))) or "none"
         raise ValueError(f"no geom with a volume has the {what} '{pattern}'. There are: {known}.")
     return found
-
-
-def _by_body(mj: mujoco.MjModel, geoms: Iterable[int]) -> Iterable[list[int]]:
-    bodies: dict[int, list[int]] = {}
-    for g in geoms:
-        bodies.setdefault(int(mj.geom_bodyid[g]), []).append(g)
-    return bodies.values()
 
 
 def _of_body(mj: mujoco.MjModel, geoms: Sequence[int]) -> Sequence[int]:
@@ -142,11 +138,8 @@ def _drawn_and_colliding(mj: mujoco.MjModel, geoms: Sequence[int]) -> tuple[list
 
 def _volume(mj: mujoco.MjModel, geoms: Sequence[int]) -> float:
     """Total volume of geoms, m^3, overlaps counted twice; nan if one is open."""
-    return sum(_volume_of(mj, g) for g in geoms)
-
-
-def _volume_of(mj: mujoco.MjModel, geom: int) -> float:
-    mesh = mesh_of(mj, geom)
-    if kind_of(mj, geom) == "sdf" or (mesh is not None and not is_closed(mesh)):
-        return np.nan
-    return geom_shape(mj, geom).volume
+    for g in geoms:
+        mesh = mesh_of(mj, g)
+        if kind_of(mj, g) == "sdf" or (mesh is not None and not is_closed(mesh)):
+            return np.nan
+    return sum(geom_shape(mj, g).volume for g in geoms)

@@ -9,9 +9,8 @@ from flowborne.kernels.arrays import Array
 from flowborne.solids.dynamics import assemble
 from flowborne.solids.flesh_dynamics import assemble_flesh
 from flowborne.solids.flesh_solve import prescribe_flesh
-from flowborne.solids.model import SolidModel
+from flowborne.solids.model import SolidModel, SolidState
 from flowborne.solids.prescribed import Driven, Mask, prescribe
-from flowborne.solids.state import SolidState
 
 LIMIT_TOLERANCE = 1e-9
 """Relative excess of a drive over its limit, or of a dof over its velocity, that is ignored."""

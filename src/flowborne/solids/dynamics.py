@@ -12,10 +12,9 @@ from scipy.sparse import csr_array, vstack
 
 from flowborne.kernels.arrays import Array, Integers, Mask
 from flowborne.solids.constraints import Rows, rows_of
-from flowborne.solids.model import SolidModel
-from flowborne.solids.momentum import Halfway, halfway
+from flowborne.solids.model import SolidModel, SolidState
+from flowborne.solids.momentum import Halfway
 from flowborne.solids.scratch import Scratch, posed, scratch, twists_about_origin
-from flowborne.solids.state import SolidState
 
 CORIOLIS_TOLERANCE = 1e-13
 """Impulses of Coriolis forces are converged to this share of the momentum."""
@@ -215,7 +214,7 @@ def kinematics(model: SolidModel, q: Array) -> Kinematics:
         model.centroid,
         s.xipos[:bodies].copy(),
         s.cdof.copy(),
-        s.subtree_com[model.dof_root],
+        s.dof_centre(),
         model.moves,
         np.zeros((0, 3)) if flesh is None else flesh.placed(s),
         no_flesh(model.nv) if flesh is None else flesh.moving(s),
@@ -259,7 +258,7 @@ def assemble(
     v, still = state.v.copy(), A @ state.v
     middle, impulse = None, still + dt * force
     if before is not None:
-        middle = halfway(model, s, before, state, dt, still, mass, force + s.bias)
+        middle = Halfway(model, s, before, state, dt, still, mass, force + s.bias)
         impulse, _ = middle.impulse(v if guess is None else guess)
     full = _with_rows(A, impulse, v, dt, rows, zones)
     return SolidSystem(*full, dt, v, rows, zones, middle, impulse, (A, impulse), v)

@@ -7,11 +7,9 @@ L_i (2 L_i - 1) at corners, 4 L_i L_j between them (Zienkiewicz and Taylor, sect
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from flowborne.kernels.arrays import Array, Integers
-from flowborne.shapes.thickness import split_quads
+from flowborne.shapes.thickness import connected, split_quads
 
 EDGES = {
     3: np.array([[0, 1], [0, 2], [1, 2]]),
@@ -130,12 +128,6 @@ def unshared(faces: Integers) -> Integers:
     corners = np.sort(faces, axis=1)
     _, first, count = np.unique(corners, axis=0, return_index=True, return_counts=True)
     return np.asarray(faces[np.sort(first[count == 1])])
-
-
-def connected(count: int, one: Integers, other: Integers) -> Integers:
-    """(count,) number of the connected part of each item; `one` and `other` (k,) are linked."""
-    links = coo_array((np.ones(len(one)), (one, other)), shape=(count, count))
-    return np.asarray(connected_components(links, directed=False)[1])
 
 
 def outer_surface(points: Array, elements: Integers) -> Integers:

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
 
 import mujoco
 import numpy as np
@@ -28,19 +27,12 @@ from flowborne.solids.scratch import Compiled, Scratch, cross, posed, twists_abo
 from flowborne.solids.tissue.growth import Grown
 
 
-class Jointed(Compiled, Protocol):
-    """What flesh needs of its model; see `SolidModel`."""
-
-    slab: bool
-    nv: int
-    dof_root: Integers
-
-
 @dataclass(frozen=True)
 class Flesh:
     """The flesh of a model. A node is a separate body, or is fixed to the bone that holds it.
 
     model       the model
+    slab        whether it is in the plane z = 0
     names       names of its fleshes
     body        (np,) body that each node is, or is fixed to
     offset      (np, 3) the node in that body's frame, m
@@ -57,7 +49,8 @@ class Flesh:
     damping     s, Rayleigh's: the damping matrix is this times the stiffness matrix
     """
 
-    model: Jointed
+    model: Compiled
+    slab: bool
     names: tuple[str, ...]
     body: Integers
     offset: Array
@@ -97,7 +90,7 @@ class Flesh:
 
     def moving_nodes(self, s: Scratch) -> csr_array:
         """(3np, nv) from v to the velocities of the nodes at the pose in `s`."""
-        twists = twists_about_origin(s.cdof, s.subtree_com[self.model.dof_root])
+        twists = twists_about_origin(s.cdof, s.dof_centre())
         node, dof = self.moved
         velocity = twists[dof, :3] + cross(twists[dof, 3:], self.nodes(s)[node])
         entry = self._entries
@@ -117,7 +110,7 @@ class Flesh:
         velocities, x y z of the pairs `moved` one after the other."""
         node, dof = self.moved
         row = (3 * node[:, None] + np.arange(3)).ravel()
-        shape = (3 * len(self.body), self.model.nv)
+        shape = (3 * len(self.body), self.model.mj.nv)
         return csr_array((np.arange(row.size), (row, np.repeat(dof, 3))), shape=shape)
 
     def of_vertices(self, velocity: Array) -> Array:
@@ -125,7 +118,7 @@ class Flesh:
         carried = self.weights.T @ velocity / self.weights.sum(axis=0)[:, None]
         point, dof = self.moved
         own = self.dofs[dof]
-        spread = np.zeros(self.model.nv)
+        spread = np.zeros(self.model.mj.nv)
         axis = self.model.mj.jnt_axis[self.model.mj.dof_jntid[dof[own]]]
         spread[dof[own]] = (axis * carried[point[own]]).sum(axis=1)
         return spread
@@ -141,7 +134,7 @@ class Flesh:
     @cached_property
     def thickness(self) -> tuple[float, ...]:
         """Thickness of each flesh at rest, without its rims, m."""
-        return tuple(thinnest(self.rest, skin, self.model.slab) for skin in self.skins)
+        return tuple(thinnest(self.rest, skin, self.slab) for skin in self.skins)
 
     @cached_property
     def sheets(self) -> Integers:
@@ -167,7 +160,7 @@ class Flesh:
         return self.elasticity.volume_ratios(self.nodes(posed(self.model, q)))
 
 
-def flesh_of(model: Jointed, grown: Sequence[Grown]) -> Flesh:
+def flesh_of(model: Compiled, slab: bool, grown: Sequence[Grown]) -> Flesh:
     """The flesh of a model from the grown parts."""
     mj, position, rotation = model.mj, *rest_poses(model.mj)[:2]
     first = np.cumsum([0, *(len(g.nodes) for g in grown)])
@@ -179,8 +172,8 @@ def flesh_of(model: Jointed, grown: Sequence[Grown]) -> Flesh:
     moduli = np.concatenate([np.tile(g.tissue.moduli, (len(g.elements), 1)) for g in grown])
     laws = np.repeat([int(g.tissue.law) for g in grown], [len(e) for e in elements])
     weights, lift = csr_array(eye_array(count)), np.zeros((count, 3))
-    surfaces = [outer_surface(nodes, parts(e)) for e in elements if not model.slab]
-    if model.slab:
+    surfaces = [outer_surface(nodes, parts(e)) for e in elements if not slab]
+    if slab:
         weights = csr_array(vstack([weights, weights]))
         lift = np.repeat([[0.0, 0.0, -0.5], [0.0, 0.0, 0.5]], count, axis=0)
         surfaces = [prism(parts(e), count) for e in elements]
@@ -189,6 +182,7 @@ def flesh_of(model: Jointed, grown: Sequence[Grown]) -> Flesh:
     carried = _carried(bones, nodes, parts(every), np.where(own[body], -1, body))
     return Flesh(
         model,
+        slab,
         tuple(g.name for g in grown),
         body,
         offset,

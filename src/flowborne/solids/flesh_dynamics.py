@@ -11,15 +11,14 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.sparse import csc_array, csr_array, dia_array
+from scipy.sparse import csc_array, csr_array, diags_array
 
 from flowborne.kernels.arrays import Array, Indices, Integers
 from flowborne.solids.constraints import rows_of
 from flowborne.solids.dynamics import System, centred
-from flowborne.solids.model import SolidModel
-from flowborne.solids.momentum import halfway
+from flowborne.solids.model import SolidModel, SolidState
+from flowborne.solids.momentum import Halfway
 from flowborne.solids.scratch import Scratch, scratch
-from flowborne.solids.state import SolidState
 
 
 @dataclass(frozen=True)
@@ -90,9 +89,9 @@ def assemble_flesh(
     still = A @ v
     centre, own = None, still + dt * force
     if before is not None:
-        centre = halfway(model, s, before, state, dt, still, M, force + s.bias)
+        centre = Halfway(model, s, before, state, dt, still, M, force + s.bias)
         own, _ = centre.impulse(v)
-    # `halfway` has changed the pose in `s`, and rows need the whole forward pass at `state`
+    # `Halfway` has changed the pose in `s`, and rows need the whole forward pass at `state`
     rows, zones = None, np.zeros(0, np.int64)
     if s.data.nefc:
         s.forward(state.q, state.v, applied)
@@ -123,7 +122,7 @@ def sparse_mass(model: SolidModel, s: Scratch) -> csr_array:
     """(nv, nv) mass matrix at the pose in `s`; call it after `Scratch.smooth_forces`."""
     mj, nv = s.mj, model.nv
     lower = csr_array((s.data.M.copy(), mj.M_colind, _starts(mj.M_rownnz)), shape=(nv, nv))
-    return csr_array(lower + lower.T - dia_array((lower.diagonal(), 0), shape=(nv, nv)))
+    return csr_array(lower + lower.T - diags_array(lower.diagonal()))
 
 
 def _jointed(s: Scratch, part: Callable[[Array, Array, float], Array], dt: float) -> csr_array:
@@ -132,7 +131,7 @@ def _jointed(s: Scratch, part: Callable[[Array, Array, float], Array], dt: float
     active = slice(data.nefmT)
     strength = part(data.efm_ts[active], data.efm_tk[active], dt)
     tendons = _tendons(s, strength, data.efm_tid[active])
-    return csr_array(tendons + _diagonal(part(data.efm_diag, data.efm_ck, dt)))
+    return csr_array(tendons + diags_array(part(data.efm_diag, data.efm_ck, dt)))
 
 
 def _tendons(s: Scratch, strength: Array, active: Indices) -> csr_array:
@@ -144,11 +143,7 @@ def _tendons(s: Scratch, strength: Array, active: Indices) -> csr_array:
         (data.ten_J.copy(), mj.ten_J_colind, _starts(mj.ten_J_rownnz)), (mj.ntendon, mj.nv)
     )
     chosen = J[active]
-    return csr_array(chosen.T @ _diagonal(strength) @ chosen)
-
-
-def _diagonal(values: Array) -> dia_array:
-    return dia_array((values, 0), shape=(len(values), len(values)))
+    return csr_array(chosen.T @ diags_array(strength) @ chosen)
 
 
 def _starts(counts: Indices) -> Integers:

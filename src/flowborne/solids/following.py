@@ -6,10 +6,9 @@ import numpy as np
 
 from flowborne.kernels.arrays import Array, Integers, Mask
 from flowborne.solids.dynamics import Kinematics, kinematics
-from flowborne.solids.model import SolidModel
+from flowborne.solids.model import SolidModel, SolidState
 from flowborne.solids.momentum import mass_matrix, mass_times
 from flowborne.solids.prescribed import symmetric_inverse
-from flowborne.solids.state import SolidState
 
 
 def follow(model: SolidModel, q: Array, change: Array) -> Array:

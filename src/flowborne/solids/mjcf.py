@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -10,11 +12,11 @@ from xml.etree import ElementTree
 
 import mujoco
 import numpy as np
+from mujoco import MjModel, MjSpec
 
 from flowborne.kernels.arrays import Array
 from flowborne.shapes.own import PlacedShape
 from flowborne.shapes.section import Section
-from flowborne.solids.compiler import compiled_quietly, refusal, unreadable
 from flowborne.solids.displacing import BY_RULE, Displace, chosen_geoms, write_groups
 from flowborne.solids.geoms import (
     CONTACT_ONLY,
@@ -34,6 +36,20 @@ from flowborne.solids.model_files import ModelFiles, gathered, parsed
 ARENA = 1 << 26
 """Bytes of MuJoCo's working memory without the pairs of bodies; by default it grows with the square
 of the number of dofs."""
+
+
+STDERR = 2
+"""File descriptor that Qhull writes to, past Python's `sys.stderr`."""
+
+NEGLIGIBLE = 1e-6
+"""kg and kg m^2 that a body without mass may be given: negligible for any real body."""
+
+REMEDIES = (
+    {"balanceinertia": True},
+    {"boundmass": NEGLIGIBLE, "boundinertia": NEGLIGIBLE},
+    {"balanceinertia": True, "boundmass": NEGLIGIBLE, "boundinertia": NEGLIGIBLE},
+)
+"""Attributes of the compiler element that correct inertias, in the order of trial."""
 
 
 @dataclass(frozen=True)
@@ -65,22 +81,15 @@ class Given:
 NOTHING = Given()
 
 
-def compiled(
+def bones_of(
     source: str | Path, slab: bool, gravity: tuple[float, float, float], given: Given = NOTHING
-) -> mujoco.MjModel:
-    """MuJoCo's model of an MJCF file (a Path) or text (a str).
+) -> tuple[MjSpec, MjModel]:
+    """The spec and MuJoCo's model of an MJCF file (a Path) or text (a str), without flesh.
 
     MuJoCo's own medium, actuators, sleeping and noslip pass are switched off: the fluid, the
     motions and the controller replace them.
     raises  ValueError for a bad model
     """
-    return bones_of(source, slab, gravity, given)[1]
-
-
-def bones_of(
-    source: str | Path, slab: bool, gravity: tuple[float, float, float], given: Given = NOTHING
-) -> tuple[mujoco.MjSpec, mujoco.MjModel]:
-    """The spec and the model of an MJCF file or text, as `compiled`, without flesh."""
     where = _named(source)
     spec = read_spec(source, given.packages)
     wrong = next(wrong_spec_values(spec), None)
@@ -125,14 +134,76 @@ def _errors_at(where: str) -> Iterator[None]:
         raise ValueError(f"{where}: {error}") from error
 
 
-def _compiled(spec: mujoco.MjSpec, where: str) -> mujoco.MjModel:
+def compiled_quietly(spec: MjSpec) -> MjModel:
+    """The model of a spec, with colours clipped to 0 to 1 and without Qhull's messages.
+
+    raises  ValueError for a bad model
+    """
+    with _silent_stderr():
+        mj = spec.compile()
+    for colours in (mj.geom_rgba, mj.mat_rgba, mj.skin_rgba):
+        np.clip(np.nan_to_num(colours), 0.0, 1.0, out=colours)
+    return mj
+
+
+@contextmanager
+def _silent_stderr() -> Iterator[None]:
+    kept, nothing = os.dup(STDERR), os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nothing, STDERR)
+        yield
+    finally:
+        os.dup2(kept, STDERR)
+        os.close(kept)
+        os.close(nothing)
+
+
+def _unreadable(where: str, error: Exception) -> ValueError:
+    """The error for a model that its reader refuses."""
+    return ValueError(f"{where} cannot be read: {error}. Mend the MJCF there.")
+
+
+def _refusal(spec: MjSpec, where: str, error: ValueError) -> ValueError:
+    """The error for a model that does not compile, with a remedy that has been tried.
+
+    spec   of the model, not changed
+    where  name of the model
+    """
+    found = re.search(r"Error: (.*inertia.*?)\s*Element name '([^']*)'", str(error), re.DOTALL)
+    if found is None:
+        return _unreadable(where, error)
+    why = re.sub(r"; use .*|error '|' in fullinertia", "", found[1].strip())
+    return ValueError(
+        f"{where}: MuJoCo refuses the inertia of body '{found[2]}' ({why}). {_remedy(spec)}"
+    )
+
+
+def _remedy(spec: MjSpec) -> str:
+    """A sentence: how to correct inertias that MuJoCo refuses."""
+    for keys in REMEDIES:
+        corrected = spec.copy()
+        for key, value in keys.items():
+            setattr(corrected.compiler, key, value)
+        try:
+            compiled_quietly(corrected)
+        except ValueError:
+            continue
+        written = " ".join(f'{key}="{str(value).lower()}"' for key, value in keys.items())
+        return (
+            f"Correct its <inertial>, or add <compiler {written}/>, in a URDF within <mujoco> in "
+            "<robot>."
+        )
+    return "Correct its <inertial>."
+
+
+def _compiled(spec: MjSpec, where: str) -> MjModel:
     try:
         return compiled_quietly(spec)
     except ValueError as error:
-        raise refusal(spec, where, error) from error
+        raise _refusal(spec, where, error) from error
 
 
-def _weightless(spec: mujoco.MjSpec, chosen: set[int], given: Given) -> list[mujoco.MjsGeom]:
+def _weightless(spec: MjSpec, chosen: set[int], given: Given) -> list[mujoco.MjsGeom]:
     """Geoms without mass: the scene gives a density, which applies to other geoms of the body."""
     displacing = {geom.parent.id for geom in spec.geoms if geom.id in chosen}
     return [
@@ -144,7 +215,7 @@ def _weightless(spec: mujoco.MjSpec, chosen: set[int], given: Given) -> list[muj
     ]
 
 
-def _set_floating(spec: mujoco.MjSpec, name: str, where: str) -> None:
+def _set_floating(spec: MjSpec, name: str, where: str) -> None:
     held = {body.name: body for body in spec.worldbody.bodies if not body.joints}
     if name not in held:
         listed = ", ".join(held) or "none"
@@ -155,7 +226,7 @@ def _set_floating(spec: mujoco.MjSpec, name: str, where: str) -> None:
     held[name].add_freejoint(name=name)
 
 
-def read_spec(source: str | Path, packages: Sequence[Path] = ()) -> mujoco.MjSpec:
+def read_spec(source: str | Path, packages: Sequence[Path] = ()) -> MjSpec:
     """The spec of a model file (a Path) or text.
 
     The text is checked first: MuJoCo ignores text after the end of a model, and allocates any size
@@ -173,7 +244,7 @@ def read_spec(source: str | Path, packages: Sequence[Path] = ()) -> mujoco.MjSpe
             for wrong in too_large(parsed(text)):
                 raise ValueError(wrong)
     except ElementTree.ParseError as error:
-        raise unreadable(where, error) from error
+        raise _unreadable(where, error) from error
     except OSError as error:
         which = where if Path(error.filename) == source else f"{where}: {error.filename}"
         raise ValueError(f"{which} cannot be read: {error.strerror}. Mend that.") from error
@@ -181,10 +252,13 @@ def read_spec(source: str | Path, packages: Sequence[Path] = ()) -> mujoco.MjSpe
         raise ValueError(f"{where}: {error}") from error
     try:
         if isinstance(source, str):
-            return mujoco.MjSpec.from_string(source)
-        spec = mujoco.MjSpec.from_file(files.name, vfs=files.in_memory())
+            return MjSpec.from_string(source)
+        memory = mujoco.MjVfs()
+        for name, content in (files.texts | files.assets).items():
+            memory[name] = content
+        spec = MjSpec.from_file(files.name, vfs=memory)
     except ValueError as error:
-        raise unreadable(where, error) from error
+        raise _unreadable(where, error) from error
     spec.assets = files.assets
     return spec
 
@@ -193,8 +267,8 @@ def _named(source: str | Path) -> str:
     return f"model {source}" if isinstance(source, Path) else "model text"
 
 
-def compiled_with_flesh(spec: mujoco.MjSpec, gravity: tuple[float, float, float]) -> mujoco.MjModel:
-    """MuJoCo's model of bones and flesh, with the options of `compiled`.
+def compiled_with_flesh(spec: MjSpec, gravity: tuple[float, float, float]) -> MjModel:
+    """MuJoCo's model of bones and flesh, with the options of `bones_of`.
 
     raises  ValueError for a bad model, and for one with a flex
     """
@@ -210,7 +284,7 @@ def compiled_with_flesh(spec: mujoco.MjSpec, gravity: tuple[float, float, float]
     return mj
 
 
-def _set_options(spec: mujoco.MjSpec, gravity: tuple[float, float, float]) -> None:
+def _set_options(spec: MjSpec, gravity: tuple[float, float, float]) -> None:
     option = spec.option
     option.gravity = gravity
     option.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
@@ -229,7 +303,7 @@ def _set_options(spec: mujoco.MjSpec, gravity: tuple[float, float, float]) -> No
     option.enableflags &= ~int(enable.mjENBL_SLEEP)
 
 
-def _refuse_unsupported(mj: mujoco.MjModel, where: str) -> None:
+def _refuse_unsupported(mj: MjModel, where: str) -> None:
     wrong = next(wrong_model_values(mj), None)
     if wrong is not None:
         raise ValueError(f"{where}: {wrong}")
@@ -247,7 +321,7 @@ def _refuse_unsupported(mj: mujoco.MjModel, where: str) -> None:
             )
 
 
-def slab_section(mj: mujoco.MjModel, geom: int, position: Array, rotation: Array) -> Section:
+def slab_section(mj: MjModel, geom: int, position: Array, rotation: Array) -> Section:
     """Cross-section of a geometry at its rest pose.
 
     raises  ValueError with the name of a geometry that has none
@@ -262,7 +336,7 @@ def slab_section(mj: mujoco.MjModel, geom: int, position: Array, rotation: Array
         ) from error
 
 
-def _set_slab_inertias(spec: mujoco.MjSpec, mj: mujoco.MjModel) -> None:
+def _set_slab_inertias(spec: MjSpec, mj: MjModel) -> None:
     """Give each body of `spec` the mass, centre and inertia per unit depth of its sections.
 
     An explicit <inertial> is kept and is per unit depth. A height that all bodies have in common is

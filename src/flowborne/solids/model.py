@@ -1,8 +1,10 @@
-"""The articulated body: immutable, shared by all copies of a world."""
+"""The articulated body: immutable, shared by all copies of a world; and its state."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
@@ -12,12 +14,10 @@ import numpy as np
 from flowborne.kernels.arrays import Array, Integers, Mask
 from flowborne.kernels.triangles import distances_to_mesh
 from flowborne.shapes.own import PlacedShape
-from flowborne.shapes.section import Section
 from flowborne.solids import displaced, geoms, mjcf
 from flowborne.solids.flesh import flesh_of, points_of_flesh
 from flowborne.solids.geoms import own_by_mesh
 from flowborne.solids.mjcf import NOTHING, Given
-from flowborne.solids.state import SolidState
 from flowborne.solids.tissue.growth import Grown
 from flowborne.solvers.cholesky import Ordering
 
@@ -33,7 +33,22 @@ SUFFIXES = {
     SLIDE: ("",),
     HINGE: ("",),
 }
-WIDTHS = {FREE: 7, BALL: 4, SLIDE: 1, HINGE: 1}
+JOINT_KINDS = {HINGE: "hinge", SLIDE: "slide", BALL: "ball joint", FREE: "free joint"}
+
+
+@dataclass
+class SolidState:
+    """Positions and velocities of the articulated bodies in generalised coordinates.
+
+    q  (nq,) MuJoCo's qpos: m, rad, unit quaternions
+    v  (nv,) MuJoCo's qvel: m/s, rad/s
+    """
+
+    q: Array
+    v: Array
+
+    def copy(self) -> SolidState:
+        return SolidState(self.q.copy(), self.v.copy())
 
 
 class SolidModel:
@@ -93,8 +108,9 @@ class SolidModel:
         self.subtree_mass: Array = np.array(mj.body_subtreemass)
         self.body_names = _names(mj, mujoco.mjtObj.mjOBJ_BODY, self.nbody)
         self._bodies = {name: b for b, name in enumerate(self.body_names)}
+        self._rest = geoms.rest_poses(mj)
         self._set_dofs()
-        self.flesh = flesh_of(self, grown) if grown else None
+        self.flesh = flesh_of(self, slab, grown) if grown else None
         self._set_geoms()
         self._set_displaced()
 
@@ -114,7 +130,7 @@ class SolidModel:
         given    densities, shapes and choices in addition to the file
         raises   ValueError when the model is bad
         """
-        return cls(mjcf.compiled(Path(path), slab, gravity, given), slab, shapes=given.shapes)
+        return cls(mjcf.bones_of(Path(path), slab, gravity, given)[1], slab, shapes=given.shapes)
 
     @classmethod
     def from_string(
@@ -128,7 +144,7 @@ class SolidModel:
     ) -> SolidModel:
         """Model of an MJCF text; as `from_file`."""
         given = Given(density, shapes=shapes)
-        return cls(mjcf.compiled(xml, slab, gravity, given), slab, shapes=shapes)
+        return cls(mjcf.bones_of(xml, slab, gravity, given)[1], slab, shapes=shapes)
 
     @classmethod
     def with_flesh(
@@ -229,15 +245,11 @@ class SolidModel:
 
     def dofs_of(self, joint: str) -> Integers:
         """Dofs of a joint. Raises ValueError for an unknown name."""
-        j = self.joint(joint)
-        first = int(self.mj.jnt_dofadr[j])
-        return np.arange(first, first + len(SUFFIXES[int(self.mj.jnt_type[j])]))
+        return (self._joint_of_dof == self.joint(joint)).nonzero()[0]
 
     def positions_of(self, joint: str) -> Integers:
         """Indices in q of a joint: 7 for a free joint, 4 for a ball, else 1."""
-        j = self.joint(joint)
-        first = int(self.mj.jnt_qposadr[j])
-        return np.arange(first, first + WIDTHS[int(self.mj.jnt_type[j])])
+        return (self._joint_of_index == self.joint(joint)).nonzero()[0]
 
     def joint(self, name: str) -> int:
         """Number of a joint. Raises ValueError for an unknown name."""
@@ -249,34 +261,25 @@ class SolidModel:
 
     def rest_pose(self, geom: int) -> tuple[Array, float]:
         """A geometry at rest: (3, 3) its frame to the world's, and the height of its centre, m."""
-        _, _, position, rotation = geoms.rest_poses(self.mj)
+        _, _, position, rotation = self._rest
         g = int(self.geom_id[geom])
         return rotation[g], float(position[g, 2])
-
-    def section_of(self, geom: int) -> Section:
-        """Cross-section of a geometry of a slab, in the frame of the geometry."""
-        g = int(self.geom_id[geom])
-        _, _, position, rotation = geoms.rest_poses(self.mj)
-        return mjcf.slab_section(self.mj, g, position[g], rotation[g])
 
     def _set_dofs(self) -> None:
         mj = self.mj
         self.joint_names = _names(mj, mujoco.mjtObj.mjOBJ_JOINT, mj.njnt)
         self._joints = {name: j for j, name in enumerate(self.joint_names)}
-        widths = [WIDTHS[int(kind)] for kind in mj.jnt_type]
+        widths = np.diff(mj.jnt_qposadr, append=mj.nq)
         self._joint_of_index = np.repeat(np.arange(mj.njnt), widths)
         self._joint_of_dof = np.array(mj.dof_jntid, dtype=np.int64)
-        names: list[str] = []
+        named = zip(self.joint_names, mj.jnt_type, strict=True)
+        self.dof_names = tuple(name + suffix for name, kind in named for suffix in SUFFIXES[kind])
+        scalar = np.isin(mj.jnt_type, (SLIDE, HINGE))
+        limited = scalar & (mj.jnt_limited != 0)
         self.dof_position: Integers = np.full(self.nv, -1)
+        self.dof_position[mj.jnt_dofadr[scalar]] = mj.jnt_qposadr[scalar]
         self.dof_range: Array = np.tile([-np.inf, np.inf], (self.nv, 1))
-        for j, name in enumerate(self.joint_names):
-            kind, first = int(mj.jnt_type[j]), int(mj.jnt_dofadr[j])
-            names += [name + suffix for suffix in SUFFIXES[kind]]
-            if kind in (SLIDE, HINGE):
-                self.dof_position[first] = mj.jnt_qposadr[j]
-                if mj.jnt_limited[j]:
-                    self.dof_range[first] = mj.jnt_range[j]
-        self.dof_names = tuple(names)
+        self.dof_range[mj.jnt_dofadr[limited]] = mj.jnt_range[limited]
         self.dof_body: Integers = np.array(mj.dof_bodyid, dtype=np.int64)
         self.dof_root: Integers = mj.body_rootid[self.dof_body].astype(np.int64)
         self.moves: Mask = np.zeros((self.nbody, self.nv), bool)
@@ -304,7 +307,7 @@ class SolidModel:
         self.geom_rgba: Array = mj.geom_rgba[self.geom_id].astype(np.float64)
         self.geom_covered: Mask = np.zeros(self.ngeom, bool)
         if self.flesh is not None:
-            _, _, position, rotation = geoms.rest_poses(mj)
+            _, _, position, rotation = self._rest
             for n, (shape, g) in enumerate(zip(self.geom_shape, chosen, strict=True)):
                 points = position[g] + shape.landmarks() @ rotation[g].T
                 outside = distances_to_mesh(points, self.flesh.rest, self.flesh.surface)
@@ -313,7 +316,7 @@ class SolidModel:
     def _set_displaced(self) -> None:
         self.volume: Array = np.zeros(self.nbody)
         self.centroid: Array = np.zeros((self.nbody, 3))
-        body_position, body_rotation, position, rotation = geoms.rest_poses(self.mj)
+        body_position, body_rotation, position, rotation = self._rest
         for body in range(self.nbody):
             solids = [
                 self._solid(int(g), position[self.geom_id[g]], rotation[self.geom_id[g]])
@@ -338,6 +341,16 @@ class SolidModel:
         box = geoms.box_of(self.mj, g, position, rotation)
         centroid = position + rotation @ centre
         return displaced.Solid(shape, position, rotation, *box, volume, centroid)
+
+
+def joint_kind(model: SolidModel, joint: str) -> int:
+    """MuJoCo's number of the joint's kind."""
+    return int(model.mj.jnt_type[model.joint(joint)])
+
+
+def joint_unit(model: SolidModel, joint: str) -> float:
+    """SI value of one unit in a scene: pi / 180 rad of a degree, or 1 m for a slide."""
+    return 1.0 if joint_kind(model, joint) == SLIDE else math.pi / 180.0
 
 
 def _bones(mj: mujoco.MjModel, grown: Sequence[Grown]) -> int:

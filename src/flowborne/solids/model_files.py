@@ -10,6 +10,7 @@ from __future__ import annotations
 import posixpath
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from urllib.parse import unquote
@@ -17,8 +18,6 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 from xml.parsers import expat
 from xml.sax.saxutils import escape
-
-import mujoco
 
 from flowborne.base.given import read_file
 from flowborne.solids.model_checks import check_kind, check_mesh
@@ -77,11 +76,6 @@ def _quoted(value: str | None) -> bytes:
     return b'"%s"' % escape(value, {'"': "&quot;"}).encode("ascii", "xmlcharrefreplace")
 
 
-def is_address(given: str) -> bool:
-    """Whether a file is given by a package or a URL, not by a path."""
-    return given.startswith(("package:", "model:", "file:"))
-
-
 def located(given: str, model: Path, packages: Sequence[Path]) -> Path:
     """The file at an address.
 
@@ -108,16 +102,11 @@ def located(given: str, model: Path, packages: Sequence[Path]) -> Path:
 def _roots(folder: Path, name: str) -> Iterator[Path]:
     """Possible folders of a package: inside a folder, or the folder itself."""
     yield folder / name
-    if folder.name == name or _name(folder / "package.xml") == name:
+    called = None
+    with suppress(OSError, ElementTree.ParseError):
+        called = ElementTree.parse(folder / "package.xml").findtext("name")
+    if name in (folder.name, (called or "").strip()):
         yield folder
-
-
-def _name(manifest: Path) -> str:
-    """The name in a package.xml; "" without one."""
-    try:
-        return (ElementTree.parse(manifest).findtext("name") or "").strip()
-    except (OSError, ElementTree.ParseError):
-        return ""
 
 
 def parsed(text: bytes | str) -> Element:
@@ -151,13 +140,6 @@ class ModelFiles:
     texts: dict[str, bytes] = field(default_factory=dict)
     assets: dict[str, bytes] = field(default_factory=dict)
     sources: dict[str, Path] = field(default_factory=dict)
-
-    def in_memory(self) -> mujoco.MjVfs:
-        """The files as a virtual file system for MuJoCo."""
-        memory = mujoco.MjVfs()
-        for name, content in (self.texts | self.assets).items():
-            memory[name] = content
-        return memory
 
 
 def gathered(path: Path, packages: Sequence[Path] = ()) -> ModelFiles:
@@ -243,7 +225,7 @@ class _Gathering:
         file = element.attrib[key].replace("\\", "/")
         if element.tag == "mesh":
             check_mesh(file)
-        if is_address(file):
+        if file.startswith(("package:", "model:", "file:")):
             return located(file, model, self._packages)
         if given.get("strippath") == "true":
             file = posixpath.basename(file)

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-
 import mujoco
 import numpy as np
 from scipy.sparse import csr_array
 
 from flowborne.kernels.arrays import Array
 from flowborne.kernels.momentum import about_origin, momentum_impulse
-from flowborne.solids.model import SolidModel
+from flowborne.solids.model import SolidModel, SolidState
 from flowborne.solids.scratch import Scratch, posed, scratch
-from flowborne.solids.state import SolidState
 
 MOST_MOMENTA = 4
 """Half-way momenta of a model that a thread caches."""
@@ -99,83 +96,67 @@ def potential_energy(model: SolidModel, state: SolidState) -> float:
     return float(s.data.energy[0])
 
 
-@dataclass(frozen=True)
 class Halfway:
     """Coriolis and centrifugal forces at the half-way velocity of a step.
 
     Positions move by dt v before v changes, as in leapfrog, so velocity-dependent forces are second
     order in time, and do no work, only at (v + v+)/2. Along dofs that carry a whole tree, the
     equation of motion is written as the change of momentum itself, which then holds to rounding.
-
-    state  at the end of the motion, with the velocity before the step
-    dt     s
-    outer  (nv,) generalised forces other than gravity and Coriolis forces
-    still  (nv,) A v: impulse that keeps the velocity, A without constraint rows
-    mass   (nv, nv) mass matrix, dense or sparse
-    given  (bodies, 6) momentum of the subtree of each body when the positions were half-way, plus
-           the impulse of gravity during the step
-    cdof   (nv, 6) for unit velocity of each dof: angular velocity of the bodies that it moves, and
-           velocity of the point at its centre
-    centre (nv, 3) m
     """
 
-    model: SolidModel
-    state: SolidState
-    dt: float
-    outer: Array
-    still: Array
-    mass: Array | csr_array
-    given: Array
-    cdof: Array
-    centre: Array
-    _found: dict[bytes, tuple[Array, Array]] = field(default_factory=dict, repr=False)
+    def __init__(
+        self,
+        model: SolidModel,
+        s: Scratch,
+        before: SolidState,
+        state: SolidState,
+        dt: float,
+        still: Array,
+        mass: Array | csr_array,
+        outer: Array,
+    ) -> None:
+        """Call it after MuJoCo's forward pass at `state`.
+
+        before  state at the start of the motion
+        state   at its end, with the velocity before the step
+        dt      s
+        still   (nv,) A v: impulse that keeps the velocity, A without constraint rows
+        mass    (nv, nv) mass matrix, dense or sparse
+        outer   (nv,) generalised forces other than gravity and Coriolis forces
+        """
+        self._model, self._state, self._dt = model, state.copy(), dt
+        self._still, self._mass, self._outer = still, mass, outer
+        self._cdof, self._centre = s.cdof.copy(), s.dof_centre()
+        fall = dt * weight(model, s)
+        self._given = subtree_halfway_momentum(model, s, before, dt) + fall
+        self._last: tuple[bytes, tuple[Array, Array]] | None = None
 
     def impulse(self, v_plus: Array) -> tuple[Array, Array]:
         """(nv,) r of A v+ = r with the forces half-way to `v_plus` (nv,), and (nv,) a bound of its
         rounding errors. The last result is cached; do not write to it."""
         key = v_plus.tobytes()
-        if key not in self._found:
-            self._found.clear()
-            self._found[key] = self._impulse(v_plus)
-        return self._found[key]
+        if self._last is None or self._last[0] != key:
+            self._last = key, self._impulse(v_plus)
+        return self._last[1]
 
     def _impulse(self, v_plus: Array) -> tuple[Array, Array]:
-        model, dt, v = self.model, self.dt, self.state.v
+        model, dt, q, v = self._model, self._dt, self._state.q, self._state.v
         s = scratch(model)
-        later = subtree_halfway_momentum(model, s, SolidState(self.state.q, v_plus), dt)
-        s.place(self.state.q, 0.5 * (v + v_plus))
+        later = subtree_halfway_momentum(model, s, SolidState(q, v_plus), dt)
+        s.place(q, 0.5 * (v + v_plus))
         bias = np.empty(model.nv)
         mujoco.mj_rne(s.mj, s.data, 0, bias)
-        gained = self.mass @ (v_plus - v) - model.armature * (v_plus - v)
+        gained = self._mass @ (v_plus - v) - model.armature * (v_plus - v)
         return momentum_impulse(
-            self.cdof,
-            self.centre,
-            self.given,
+            self._cdof,
+            self._centre,
+            self._given,
             later,
             model.dof_body,
             model.conserved,
             gained,
-            self.still,
+            self._still,
             bias,
-            self.outer,
+            self._outer,
             dt,
         )
-
-
-def halfway(
-    model: SolidModel,
-    s: Scratch,
-    before: SolidState,
-    state: SolidState,
-    dt: float,
-    still: Array,
-    mass: Array | csr_array,
-    outer: Array,
-) -> Halfway:
-    """The forces of a step from `before`; call it after MuJoCo's forward pass at `state`.
-
-    The arguments are those of `Halfway`.
-    """
-    cdof, centre, fall = s.cdof.copy(), s.subtree_com[model.dof_root], dt * weight(model, s)
-    given = subtree_halfway_momentum(model, s, before, dt) + fall
-    return Halfway(model, state.copy(), dt, outer, still, mass, given, cdof, centre)

@@ -43,6 +43,7 @@ class Scratch:
         self.mj = copy.copy(model.mj)
         self.data = data = mujoco.MjData(self.mj)
         self.dt = float(self.mj.opt.timestep)
+        self._root = self.mj.body_rootid[self.mj.dof_bodyid]
         self._mass: Array | None = None
         self.momenta: dict[tuple[bytes, bytes, float], Array] = {}
         self.q, self.v = data.qpos, data.qvel
@@ -80,6 +81,10 @@ class Scratch:
         mujoco.mj_fwdVelocity(self.mj, self.data)
         mujoco.mj_fwdActuation(self.mj, self.data)
         mujoco.mj_fwdAcceleration(self.mj, self.data)
+
+    def dof_centre(self) -> Array:
+        """(nv, 3) points to which `cdof` refers, m: the centre of mass of each dof's tree."""
+        return self.subtree_com[self._root]
 
     def mass_matrix(self) -> Array:
         """(nv, nv) mass matrix at the present pose; overwritten by the next call."""

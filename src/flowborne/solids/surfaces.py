@@ -5,7 +5,6 @@ from __future__ import annotations
 import weakref
 from dataclasses import dataclass
 
-import mujoco
 import numpy as np
 
 from flowborne.kernels.arrays import Array, Integers
@@ -14,6 +13,7 @@ from flowborne.shapes.section import Section
 from flowborne.shapes.shape import FINENESS
 from flowborne.solids.dynamics import kinematics
 from flowborne.solids.model import SolidModel
+from flowborne.solids.scratch import posed
 
 SLAB_ARC = 64
 """Patches around a circle in a slab."""
@@ -56,8 +56,9 @@ def surfaces(model: SolidModel) -> Patches:
 def _surfaces(model: SolidModel) -> Patches:
     bodies, centres, vectors = [np.zeros(0, np.int64)], [np.zeros((0, 3))], [np.zeros((0, 3))]
     for g in np.argsort(model.geom_body, kind="stable"):
+        shape = model.geom_shape[g]
         centre, vector = (
-            _outline(model.section_of(int(g))) if model.slab else model.geom_shape[g].patches()
+            _outline(shape.section(*model.rest_pose(g))) if model.slab else shape.patches()
         )
         rotation = model.geom_rotation[g]
         centres.append(model.geom_offset[g] + centre @ rotation.T)
@@ -93,9 +94,8 @@ class Outline:
     """
 
     def __init__(self, model: SolidModel) -> None:
-        self._mj, self._data = model.mj, mujoco.MjData(model.mj)
+        self._model = model
         self._local = [shape.outermost() for shape in model.geom_shape]
-        self._geom = model.geom_id
         counts = [len(points) for points in self._local]
         self.body: Integers = np.repeat(model.geom_body, counts)
         shared = np.bincount(self.body, minlength=model.nbody)[self.body]
@@ -103,12 +103,11 @@ class Outline:
 
     def at(self, q: Array) -> Array:
         """(n, 3) the points in the world, m, with the joints at `q` (nq,)."""
-        self._data.qpos[:] = q
-        mujoco.mj_kinematics(self._mj, self._data)
-        position, rotation = self._data.geom_xpos, self._data.geom_xmat.reshape(-1, 3, 3)
+        s = posed(self._model, q)
+        position, rotation = s.geom_xpos, s.geom_xmat.reshape(-1, 3, 3)
         placed = [
             position[g] + local @ rotation[g].T
-            for g, local in zip(self._geom, self._local, strict=True)
+            for g, local in zip(self._model.geom_id, self._local, strict=True)
         ]
         return np.concatenate(placed) if placed else np.zeros((0, 3))
 

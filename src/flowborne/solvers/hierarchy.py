@@ -23,6 +23,7 @@ from flowborne.kernels.arrays import (
     Periodic,
     Real,
     Triple,
+    Vectors,
 )
 from flowborne.kernels.even import ROUNDING, find_even
 from flowborne.kernels.levels import (
@@ -64,23 +65,26 @@ def level_table(shape: tuple[int, int, int]) -> Integers:
     return np.array(levels, np.int64)
 
 
-def zeros(shape: tuple[int, int, int]) -> Array:
-    return np.zeros(shape)
-
-
 def packed(size: int) -> Real:
     return np.zeros(size, np.float32)
 
 
 class Buffers:
-    """Arrays of one hierarchy and of one solve, kept for the next system of the same kind."""
+    """Arrays of one hierarchy and of one solve, kept for the next system of the same kind.
 
-    def __init__(self, shape: tuple[int, int, int]) -> None:
+    shape     cells
+    periodic  of each axis: with the shape it decides the ghosts that buffers are left with
+    """
+
+    def __init__(self, shape: tuple[int, int, int], periodic: tuple[bool, bool, bool]) -> None:
         self.table = level_table(shape)
+        self.periodic: Periodic = np.array(periodic, np.uint8)
         total = int(self.table[-1, 0])
         n0, n1, n2 = shape
         padded = (n0 + 2 if n0 > 1 else 1, n1 + 2, n2 + 2)
-        self.finest = zeros(padded), zeros(padded), zeros(padded), zeros(padded)
+        double = [np.zeros(padded) for _ in range(9)]
+        self.finest: Finest = double[0], double[1], double[2], double[3]
+        self.vectors: Vectors = double[4], double[5], double[6], double[7], double[8]
         self.weights = packed(total), packed(total), packed(total)
         self.reaction = packed(total)
         self.inverse = packed(total)
@@ -90,16 +94,16 @@ class Buffers:
         self.orphans: Indices = np.zeros(total, np.int32)
         self.aggregates: Indices = np.zeros(total, np.int32)
         self.cycle = packed(total), packed(total), packed(total)
-        self.vectors = zeros(padded), zeros(padded), zeros(padded), zeros(padded), zeros(padded)
         self.label: Labels = np.zeros(padded, np.int32)
         self.parent: Labels = np.zeros(self.label.size + 1, np.int32)
         self.count: Labels = np.zeros(self.label.size + 1, np.int32)
 
-    def hierarchy(self, periodic: Periodic) -> Hierarchy:
-        """The arrays of all levels, on a grid with these periodic axes."""
+    @property
+    def hierarchy(self) -> Hierarchy:
+        """The arrays of all levels."""
         return (
             self.table,
-            periodic,
+            self.periodic,
             self.weights,
             self.reaction,
             self.inverse,
@@ -110,59 +114,50 @@ class Buffers:
             self.aggregates,
         )
 
+    def prepare(
+        self, faces: tuple[Array, Array, Array], reaction: Array
+    ) -> tuple[int, float, Operator]:
+        """Fill finest level, hierarchy and region labels from the weights on the faces.
 
-Kind = tuple[tuple[int, int, int], tuple[bool, bool, bool]]
-"""Cells and which axes are periodic: what decides the ghosts that buffers are left with."""
+        reaction  (cells) of K + D, which the hierarchy is made for; see `pressure.PressureSystem`
+        returns   number of regions without an open side, scale of the hierarchy's weights, and K on
+                  the finest level
+        """
+        w0, w1, w2, diagonal = self.finest
+        finest_weights(faces, (w0, w1, w2), diagonal)
+        most = largest(diagonal)
+        scale = 1.0 / most if most > 0.0 else 1.0
+        for source, target in zip((w0, w1, w2), self.weights, strict=True):
+            scaled(source, target[: source.size], scale)
+        added = at_level(self.reaction, self.table, 0)
+        added[:] = 0.0
+        d = 1 if added.shape[0] > 1 else 0
+        if reaction.size:
+            inner = added[d : added.shape[0] - d, 1:-1, 1:-1]
+            inner[:] = scale * reaction.reshape(inner.shape)
+        columns_to_diagonal(weights_at(self.weights, self.table, 0), added, self.periodic)
+        even = even_at(self.even, self.table, 0)
+        common = find_even((w0, w1, w2), self.periodic, even, ROUNDING)
+        self.table[0, COMMON] = common
+        coarsen(self.hierarchy)
+        regions = label_regions(self.finest, self.periodic, self.label, self.parent, self.count)
+        return regions, scale, (w0, w1, w2, diagonal, even, int(common))
 
-_spare: dict[Kind, list[Buffers]] = {}
+
+_spare: dict[tuple[tuple[int, int, int], tuple[bool, bool, bool]], list[Buffers]] = {}
 
 
-def borrow(kind: Kind, owner: object) -> Buffers:
+def borrow(
+    shape: tuple[int, int, int], periodic: tuple[bool, bool, bool], owner: object
+) -> Buffers:
     """Buffers that go back into store when `owner` is gone."""
-    store = _spare.setdefault(kind, [])
+    store = _spare.setdefault((shape, periodic), [])
     try:
         buffers = store.pop()
     except IndexError:
-        buffers = Buffers(kind[0])
+        buffers = Buffers(shape, periodic)
     weakref.finalize(owner, store.append, buffers)
     return buffers
-
-
-def prepare(
-    hierarchy: Hierarchy,
-    faces: tuple[Array, Array, Array],
-    reaction: Array,
-    finest: Finest,
-    label: Labels,
-    parent: Labels,
-    count: Labels,
-) -> tuple[int, float, Operator]:
-    """Fill finest level, hierarchy and region labels from the weights on the faces.
-
-    reaction  (cells) of K + D, which the hierarchy is made for; see `pressure.PressureSystem`
-    finest    padded weights and diagonal
-    returns   number of regions without an open side, scale of the hierarchy's weights, and K on the
-              finest level
-    """
-    *weights, diagonal = finest
-    table, periodic, w = hierarchy[0], hierarchy[1], (weights[0], weights[1], weights[2])
-    finest_weights(faces, w, diagonal)
-    most = largest(diagonal)
-    scale = 1.0 / most if most > 0.0 else 1.0
-    for source, target in zip(weights, hierarchy[2], strict=True):
-        scaled(source, target[: source.size], scale)
-    added = at_level(hierarchy[3], table, 0)
-    added[:] = 0.0
-    d = 1 if added.shape[0] > 1 else 0
-    if reaction.size:
-        inner = added[d : added.shape[0] - d, 1:-1, 1:-1]
-        inner[:] = scale * reaction.reshape(inner.shape)
-    columns_to_diagonal(weights_at(hierarchy[2], table, 0), added, periodic)
-    even = even_at(hierarchy[5], table, 0)
-    table[0, COMMON] = find_even(w, periodic, even, ROUNDING)
-    coarsen(hierarchy)
-    regions = label_regions(finest, periodic, label, parent, count)
-    return regions, scale, (*w, diagonal, even, int(table[0, COMMON]))
 
 
 def columns_to_diagonal(weights: Triple, added: Real, periodic: Periodic) -> None:

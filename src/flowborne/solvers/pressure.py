@@ -5,7 +5,18 @@
                                       A^-1  the response between their columns (see `mobility`)
 
 Equation (9) of the paper with all other unknowns eliminated: symmetric positive definite but for
-its null vectors (see `deflation`).
+its null vectors.
+
+A V-cycle V on K alone is a poor guide to this matrix where the term of low rank outweighs K. With
+A^-1 = R R^T and B = J R,
+
+    (V^-1 + B B^T)^-1  =  V - Y (1 + B^T Y)^-1 Y^T        Y = V B
+
+takes in every mode, a column of R, at the price of a V-cycle each (Woodbury's identity). Modes that
+weigh little against K are left out.
+
+In a region without an open side K knows the unknown only up to a constant. A sum of such constants,
+c_r in region r, is a null vector when A^-1 is 0 on the load  J^T (sum of c_r 1_r).
 """
 
 from __future__ import annotations
@@ -14,15 +25,35 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flowborne.kernels.arrays import Array, DenseTerm, Faces, Indices, Integers, Real, Rows
+from flowborne.kernels.arrays import (
+    Array,
+    DenseTerm,
+    Faces,
+    Hierarchy,
+    Indices,
+    Integers,
+    Labels,
+    Real,
+    Rows,
+)
 from flowborne.kernels.conjugate_gradients import solve
 from flowborne.kernels.levels import at_level
-from flowborne.kernels.regions import region_loads
-from flowborne.kernels.sparse_rows import padded_rows
+from flowborne.kernels.regions import NULL, region_loads
+from flowborne.kernels.sparse_rows import add_rows, padded_rows, row_gram, row_gram_along, sum_rows
+from flowborne.kernels.v_cycle import v_cycle
 from flowborne.kernels.vectors import load_cells
-from flowborne.solvers.deflation import compliant_modes, mode_amounts, mode_fields, null_basis
-from flowborne.solvers.hierarchy import borrow, prepare
+from flowborne.solvers.hierarchy import borrow
 from flowborne.solvers.mobility import Mobility, dense_mobility
+
+MOST_MODES = 32
+"""Modes that are taken in, the most compliant first; more would cost more than they save."""
+
+LEAST_WEIGHT = 0.5
+"""A mode is left out when its term cannot weigh more than this against K."""
+
+LEAST_WEIGHT_FACTORED = 100.0
+"""The same where the V-cycle knows the diagonal of the term, as it does for a factorised A^-1:
+iterations that a mode of less would save cost less than it does."""
 
 
 @dataclass(frozen=True)
@@ -51,9 +82,9 @@ class Deflation:
     """What a term adds to the system of one geometry, the same for every right-hand side.
 
     rows     of J in active cells, with padded flat indices
-    null     see `deflation.null_basis`
+    null     see `null_basis`
     fields   (m, padded shape) and
-    amounts  (m, k) of the modes in the preconditioner; see `deflation`
+    amounts  (m, k) of the modes in the preconditioner, see `mode_fields`
     """
 
     rows: Rows
@@ -116,19 +147,14 @@ class PressureSystem:
         self.slab = nz == 1
         inner = (1, nx, ny) if self.slab else self.shape
         wraps = (False, periodic[0], periodic[1]) if self.slab else periodic
-        self.periodic = np.array(wraps, np.uint8)
         x, y, z = (np.ascontiguousarray(w, np.float64) for w in weights)
         faces = (x, y, z)
         if self.slab:
             faces = (np.zeros((1, 1, 1)), x.reshape(1, nx + 1, ny), y.reshape(1, nx, ny + 1))
         self.beyond = padded_cells(beyond[0], inner), *beyond[1:]
         self._deflation: tuple[LowRankTerm, Deflation] | None = None
-        self.buffers = borrow((inner, wraps), self)
-        b = self.buffers
-        self.hierarchy = b.hierarchy(self.periodic)
-        self.regions, self.scale, self.finest = prepare(
-            self.hierarchy, faces, reaction, b.finest, b.label, b.parent, b.count
-        )
+        self.buffers = borrow(inner, wraps, self)
+        self.regions, self.scale, self.finest = self.buffers.prepare(faces, reaction)
 
     def solve(
         self,
@@ -156,7 +182,7 @@ class PressureSystem:
         load_cells(right, np.ascontiguousarray(rhs, np.float64).reshape(cells), diagonal)
         added = self.deflation(term)
         iterations, residual, converged = solve(
-            self.hierarchy,
+            b.hierarchy,
             b.cycle,
             self.finest,
             b.vectors,
@@ -199,8 +225,7 @@ class PressureSystem:
         held = null.shape[1] < self.regions
         modes = compliant_modes(mobility, rows, inverse, self.scale, max(self.shape), held)
         if modes.size:
-            fields, gram = mode_fields(self.hierarchy, b.cycle, rows, modes)
-            amounts = mode_amounts(modes, gram)
+            fields, amounts = mode_fields(b.hierarchy, b.cycle, rows, modes)
         return Deflation(rows, null, fields, amounts)
 
 
@@ -211,3 +236,79 @@ def padded_cells(cells: Integers, shape: tuple[int, int, int]) -> Integers:
     return np.ravel_multi_index(
         (i + deep, j + 1, k + 1), (shape[0] + 2 * deep, shape[1] + 2, shape[2] + 2)
     )
+
+
+def compliant_modes(
+    mobility: Mobility, rows: Rows, inverse: Real, scale: float, across: int, held: bool
+) -> Array:
+    """(k, m) R with R R^T equal to scale x A^-1 but for modes that weigh little against K.
+
+    mobility  A^-1
+    inverse   padded: of the diagonal that the V-cycle is made for; what a mode weighs against it is
+              `row_gram`
+    scale     of the hierarchy's weights
+    across    most cells along an axis: how much more a mode may weigh against K than against its
+              diagonal
+    held      whether the term alone holds the level of some region, which no V-cycle knows
+    """
+    if mobility.size == 0:
+        return np.zeros((0, 0))
+    root = np.sqrt(scale) * mobility.compliant
+    if mobility.is_dense:
+        weight = root.T @ row_gram(rows, inverse, mobility.size) @ root
+    else:
+        weight = row_gram_along(rows, inverse, root)
+    ratio, turned = np.linalg.eigh(weight)
+    least = LEAST_WEIGHT if mobility.is_dense or held else LEAST_WEIGHT_FACTORED
+    chosen = np.flatnonzero(ratio * across > least)[-MOST_MODES:]
+    return np.ascontiguousarray(root @ turned[:, chosen])
+
+
+def mode_fields(
+    hierarchy: Hierarchy, cycle: tuple[Real, Real, Real], rows: Rows, modes: Array
+) -> tuple[Real, Array]:
+    """Y (m, padded shape) with ghosts 0, and (m, k) (1 + B^T Y)^-1 R^T, how much of each field to
+    take off for a load J^T V r, for modes (k, m)."""
+    x, b, _ = cycle
+    z, source = at_level(x, hierarchy[0], 0), at_level(b, hierarchy[0], 0)
+    inside = tuple(slice(1, -1) if n > 1 else slice(None) for n in z.shape)
+    size, count = modes.shape
+    fields, matrix = np.zeros((count, *z.shape), z.dtype), np.eye(count)
+    for n in range(count):
+        source[:] = 0.0
+        add_rows(source, rows, np.ascontiguousarray(modes[:, n]))
+        v_cycle(hierarchy, *cycle)
+        fields[n][inside] = z[inside]
+        matrix[:, n] += sum_rows(z, rows, size) @ modes
+    scale = 1.0 / np.sqrt(np.diag(matrix))
+    inverse: Array = scale[:, None] * np.linalg.inv(scale[:, None] * matrix * scale) * scale
+    return fields, inverse @ modes.T
+
+
+def null_basis(count: Labels, loads: Array, mobility: Mobility) -> Array:
+    """(regions, q) constants per region of an orthonormal basis of the operator's null space.
+
+    count     (regions,) cells of each region without an open side
+    loads     (regions, k) J^T 1_r of each region
+    mobility  A^-1
+
+    A region whose load has no response is a null vector of its own. Among the others, combinations
+    c with  c^T F c = 0  for F_rs = (J^T 1_r)^T A^-1 (J^T 1_s) are: of two regions whose loads are
+    opposite, only the constant that both share.
+    """
+    scale = 1.0 / np.sqrt(count)
+    answers = mobility.times(loads)
+    strength = np.einsum("rk,rk->r", answers, loads) * scale**2
+    largest = mobility.largest() * np.square(loads * scale[:, None]).max(initial=0)
+    held = strength > NULL * largest
+    free = np.flatnonzero(~held)
+    basis = np.zeros((count.size, free.size))
+    basis[free, np.arange(free.size)] = scale[free]
+    if not held.any():
+        return basis
+    scaled = loads[held] * scale[held, None]
+    energy, vectors = np.linalg.eigh(mobility.times(scaled) @ scaled.T)
+    null = vectors[:, energy < NULL * energy[-1]]
+    joint = np.zeros((count.size, null.shape[1]))
+    joint[held] = scale[held, None] * null
+    return np.concatenate([basis, joint], axis=1)

@@ -1,4 +1,4 @@
-"""The kernels of `deflation` in NumPy: slower, and nearer to what they mean."""
+"""Deflation in NumPy: slower, and nearer to what it means."""
 
 from __future__ import annotations
 

@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 from flowborne.base.errors import SceneError
-from flowborne.motion.bvh import read_bvh
 from flowborne.motion.clip import Clip
 from flowborne.motion.human.body import human_mjcf
 from flowborne.motion.human.clip_skeleton import lost_bones, skeleton_of
 from flowborne.motion.human.skeleton import JOINTS, PARENTS, TIPS, Skeleton, standard_skeleton
 from flowborne.motion.mapping import mapping_of
 from flowborne.solids.model import SolidModel
+
+from ...read_bvh import read_bvh
 
 MOCAP = Path(__file__).parents[4] / "shared" / "mocap"
 

@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 import pyvista as pv
 
-from flowborne.coupling.motion import JointCommand
 from flowborne.coupling.report import Outcome
 from flowborne.coupling.step import step
 from flowborne.coupling.world import Fluid, Setup, World
@@ -25,6 +24,7 @@ from flowborne.shapes.primitives import ShapeBox
 from flowborne.solids.elements import surface_of
 from flowborne.solids.model import SolidModel
 from flowborne.solids.tissue.growth import Tissue, add_flesh
+from flowborne.solids.trajectories import JointCommand
 from flowborne.view import style
 from flowborne.view.maps import MapSpace
 from flowborne.view.pictures import Picture

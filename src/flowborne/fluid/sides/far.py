@@ -1,4 +1,4 @@
-"""A side beyond which the fluid goes on as if for ever.
+"""A side beyond which the fluid goes on as if for ever, and the sea that is there.
 
 What bodies in endless fluid do at once is the pressure of a dipole, p = d.r / r^D in D dimensions.
 Of all multiples of p, dp/dn = -(D - 1) (n.r) / r^2 p fits it best over all directions d, which is a
@@ -7,7 +7,11 @@ measured from the middle of the domain, so that the matrix stays the same while 
 one end of an axis is a mirror, that is at the mirror.
 
 For dipoles along the axes `fluid.dipoles` makes it exact. What the vorticity inside does is in
-`coupling.far_field`. The sea may flow: the side through which its stream leaves is open.
+`fluid.wake`.
+
+A domain lies in a sea where all its sides are far, or closed opposite a far one: such a side is a
+mirror. The sea may flow, with the velocity of its far sides: the side through which its stream
+leaves is open.
 """
 
 from __future__ import annotations
@@ -15,6 +19,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
+
+import numpy as np
 
 from flowborne.fluid.grid import Array, Grid
 from flowborne.fluid.sides.kinds import BoundaryOpen
@@ -73,7 +79,9 @@ class BoundaryFar(BoundaryOpen):
         """Raises ValueError when nothing is open or far across other axes, or another far side has
         another velocity."""
         for side in (side for pair in pairs for side in pair):
-            if isinstance(side, BoundaryFar) and side.stream != self.stream:
+            if not isinstance(side, BoundaryFar):
+                continue
+            if (side.velocity, side.strength) != (self.velocity, self.strength):
                 raise ValueError(
                     f"boundaries: far sides have the velocities {list(self.velocity)} and "
                     f"{list(side.velocity)}, or other strengths. {ONE_SEA}"
@@ -83,13 +91,11 @@ class BoundaryFar(BoundaryOpen):
             raise ValueError(f"boundaries: {CHANNEL}")
         return replace(self, centre=centre)
 
-    @property
-    def stream(self) -> tuple[Velocity, Strength]:
-        return self.velocity, self.strength
-
     def is_exit(self, place: Place) -> bool:
-        """Whether the stream leaves through the side at a place."""
-        return exit_of(self.velocity) == (place.axis, place.upper)
+        """Whether the stream leaves through the side at a place: that which most of it crosses."""
+        axis = max(range(3), key=lambda axis: abs(self.velocity[axis]))
+        most = self.velocity[axis]
+        return most != 0.0 and (place.axis, place.upper) == (axis, most > 0.0)
 
     def irrotational_inflow(self, place: Place) -> bool:
         return not self.is_exit(place)
@@ -121,13 +127,6 @@ class BoundaryFar(BoundaryOpen):
         }
 
 
-def exit_of(velocity: Velocity) -> tuple[int, bool] | None:
-    """Axis, and whether the upper side across it, through which a stream leaves: that which most of
-    it crosses; None without a stream."""
-    axis = max(range(3), key=lambda axis: abs(velocity[axis]))
-    return (axis, velocity[axis] > 0.0) if velocity[axis] else None
-
-
 def centre_among(pairs: Sequence[Pair]) -> Centre:
     """Where the middle of bodies and their mirror images is.
 
@@ -149,3 +148,78 @@ def _between(low: type[Boundary] | Boundary, high: type[Boundary] | Boundary) ->
     if ends == (0, 0):
         return None
     return 0.5 if ends[0] == ends[1] else float(ends[0] > ends[1])
+
+
+PARTLY = (
+    "far sides have a velocity, and other sides take part in the flow. Make every side far, or "
+    "closed opposite a far one"
+)
+"""What is wrong with a stream in a domain that lies in no sea, and the remedy."""
+
+ACROSS = (
+    "the sea's velocity crosses a closed side. Make its component across that side 0, or the side "
+    "far"
+)
+"""What is wrong with a stream against a mirror, and the remedy."""
+
+
+@dataclass(frozen=True)
+class Sea:
+    """What is around a domain.
+
+    side     one of its far sides: all have the sea's velocity
+    far      their places
+    mirrors  places of the closed sides
+    exit     place of the far side through which the stream leaves; None in still water
+    """
+
+    side: BoundaryFar
+    far: tuple[Place, ...]
+    mirrors: tuple[Place, ...]
+    exit: Place | None
+
+    def velocity(self, time: float) -> Array:
+        """(3,) m/s at `time` (s)."""
+        return self.side.strength.at(time) * np.array(self.side.velocity)
+
+    @property
+    def driven(self) -> tuple[Place, ...]:
+        """The far sides but the exit."""
+        return tuple(place for place in self.far if place != self.exit)
+
+
+def sea_of(sides: Sequence[tuple[Place, Boundary]]) -> Sea | None:
+    """The sea around a domain with these sides; None where no side is far, or others take part.
+
+    raises  ValueError when the sea has a velocity, and other sides take part or it crosses a mirror
+    """
+    far = [(place, side) for place, side in sides if isinstance(side, BoundaryFar)]
+    if not far:
+        return None
+    first, kinds = far[0][1], [(place.axis, side) for place, side in sides]
+    if problem := stream_problem(first.velocity, kinds):
+        raise ValueError(f"boundaries: {problem}")
+    if not in_sea(kinds):
+        return None
+    leaves = [place for place, side in far if side.is_exit(place)]
+    mirrors = tuple(place for place, side in sides if side.mirrors)
+    return Sea(first, tuple(p for p, _ in far), mirrors, leaves[0] if leaves else None)
+
+
+Kinds = Sequence[tuple[int, Boundary | type[Boundary]]]
+"""The sides of a domain, or their kinds, each with the axis that it is across."""
+
+
+def in_sea(sides: Kinds) -> bool:
+    """Whether all sides are far, or mirrors opposite far ones."""
+    far = {axis for axis, side in sides if side.endless}
+    return all(side.endless or (side.mirrors and axis in far) for axis, side in sides)
+
+
+def stream_problem(velocity: Velocity, sides: Kinds) -> str | None:
+    """What is wrong with the velocity of far sides, and the remedy; None if nothing is."""
+    if not any(velocity):
+        return None
+    if not in_sea(sides):
+        return PARTLY
+    return ACROSS if any(velocity[axis] for axis, side in sides if side.mirrors) else None

@@ -67,7 +67,7 @@ def skeleton_of(
     raises   SceneError when joints that need a bone between them coincide
     """
     standard = standard_skeleton()
-    rest = _rest_positions(clip)
+    rest = dict(zip(clip.names, clip.rest, strict=True))
     found = _found(clip, mapping)
     scale = _scale(found, standard)
     _insert_lost_bones(found, standard, scale, _lost(found, standard, scale))
@@ -117,7 +117,7 @@ def between(clip: Clip, mapping: Mapping[str, str]) -> dict[str, tuple[str, ...]
 
 def _found(clip: Clip, mapping: Mapping[str, str]) -> dict[str, Array]:
     """(3,) m, positions of the mapped joints and of the tips below them."""
-    rest = _rest_positions(clip)
+    rest = dict(zip(clip.names, clip.rest, strict=True))
     found = {joint: rest[mapping[joint]] for joint in JOINTS if joint in mapping}
     for tip, joint in TIPS.items():
         if joint not in mapping:
@@ -128,14 +128,6 @@ def _found(clip: Clip, mapping: Mapping[str, str]) -> dict[str, Array]:
         if np.linalg.norm(far - start) > 0.0:
             found[tip] = far
     return found
-
-
-def _rest_positions(clip: Clip) -> dict[str, Array]:
-    """Joint of the clip -> (3,) m, position with all rotations zero and the root at the origin."""
-    positions = np.zeros_like(clip.offsets)
-    for joint, parent in enumerate(clip.parents):
-        positions[joint] = clip.offsets[joint] + (positions[parent] if parent >= 0 else 0.0)
-    return dict(zip(clip.names, positions, strict=True))
 
 
 def _scale(found: Mapping[str, Array], standard: Skeleton) -> float:

@@ -7,7 +7,7 @@ axis. Relative to a standing pose, the clip has the same motion with comparable 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -43,21 +43,7 @@ MAX_ZERO_ROTATION = np.radians(60.0)
 the file are the pose of a person."""
 
 
-@dataclass(frozen=True, eq=False)
-class Posture:
-    """The posture of the person of a clip.
-
-    rest  (n, 4) rotations of the clip's joints from its zeros to a pose in which the person stands
-          upright and faces forward
-    up    (3,) mean over the clip of the unit vector from the middle of the ankles to the middle of
-          the shoulders, in the clip's axes
-    """
-
-    rest: Array
-    up: Array
-
-
-def posture_of(clip: Clip, mapping: Mapping[str, str]) -> Posture:
+def posture_of(clip: Clip, mapping: Mapping[str, str]) -> tuple[Array, Array]:
     """A standing pose of a clip's person, and the mean direction from ankles to shoulders.
 
     Trunk and legs get the pose of the clip closest to standing, or the zeros of the file if these
@@ -65,6 +51,9 @@ def posture_of(clip: Clip, mapping: Mapping[str, str]) -> Posture:
     the zeros of the file only if the arm hangs there.
 
     mapping  joint of the human -> joint of the clip; hips, knees, ankles and shoulders among them
+    returns  (n, 4) rotations of the clip's joints from its zeros to a pose in which the person
+             stands upright and faces forward, and (3,) the mean over the clip of the unit vector
+             from the middle of the ankles to the middle of the shoulders, in the clip's axes
     raises   SceneError when hips, shoulders and ankles are collinear
     """
     frames = np.unique(np.linspace(0, clip.frames - 1, MAX_POSES).astype(np.int64))
@@ -79,8 +68,7 @@ def posture_of(clip: Clip, mapping: Mapping[str, str]) -> Posture:
     axes, cost = _deviations(positions, number, BODY_LINES, SIDES)
     best = int(cost.argmin())
     unturned = np.tile([1.0, 0.0, 0.0, 0.0], (1, len(clip.names), 1))
-    zero = replace(clip, rotations=unturned, translation=np.zeros((1, 3)))
-    zero_positions = zero.poses()[0]
+    zero_positions = clip.rest[None]
     zero_axes, zero_cost = _deviations(zero_positions, number, BODY_LINES, SIDES)
     zero_cost[~np.isclose(np.linalg.det(zero_axes), 1.0)] = np.inf  # collinear zeros
     not_body = ("root", "shoulder", "elbow", "wrist")
@@ -102,7 +90,7 @@ def posture_of(clip: Clip, mapping: Mapping[str, str]) -> Posture:
         shoulder = number[f"{side}_shoulder"]
         arm = [n for n, name in enumerate(clip.names) if shoulder in clip.lineage(name)]
         rest[arm] = product(_inverse_of(axes[hanging]), rotations[hanging, arm])
-    return Posture(rest, up)
+    return rest, up
 
 
 def _inverse_of(axes: Array) -> Array:

@@ -143,15 +143,14 @@ class Inertia:
         return Inertia(share * self.mass, self.centre, share * self.tensor)
 
 
-def axes_of(start: Array, end: Array, ahead: Array | None = None) -> Array:
+def axes_of(start: Array, end: Array) -> Array:
     """(3, 3) columns: sagittal, transverse and longitudinal axis of a segment, right-handed.
 
-    The longitudinal axis points from end to start. The sagittal axis is as close as possible to
-    `ahead`: by default x, or z for a segment along x, such as a foot.
+    The longitudinal axis points from end to start. The sagittal axis is as close as possible to x,
+    or to z for a segment along x, such as a foot.
     """
     longitudinal = (start - end) / np.linalg.norm(start - end)
-    if ahead is None:
-        ahead = np.eye(3)[2 if abs(longitudinal[0]) > np.sqrt(0.5) else 0]
+    ahead = np.eye(3)[2 if abs(longitudinal[0]) > np.sqrt(0.5) else 0]
     sagittal = ahead - (ahead @ longitudinal) * longitudinal
     sagittal /= np.linalg.norm(sagittal)
     return np.column_stack([sagittal, np.cross(longitudinal, sagittal), longitudinal])

@@ -13,9 +13,10 @@ from flowborne.base.extras import flesh_library
 from flowborne.base.phrases import suggestion
 from flowborne.kernels.arrays import Array
 from flowborne.shapes.mesh import ShapeMesh
+from flowborne.shapes.own import level_surface
 from flowborne.shapes.shape import Mesh, Shape
-from flowborne.solids.compiler import compiled_quietly
 from flowborne.solids.geoms import box_of, displacing_geoms, element_name, geom_shape, rest_poses
+from flowborne.solids.mjcf import compiled_quietly
 
 MOST_SAMPLES = 2_000_000
 """Most samples of a lattice; a finer lattice is made coarser."""
@@ -122,7 +123,11 @@ def bones_of(spec: mujoco.MjSpec, names: Sequence[str]) -> Bones:
                 f"body '{name}' has no geom for flesh to grow on. "
                 "Give it one that displaces fluid, or leave it out of the bones."
             )
-        parts += [_part(mj, g, bone, position[g], rotation[g]) for g in own]
+        for g in own:
+            shape, box = geom_shape(mj, g), box_of(mj, g, position[g], rotation[g])
+            surface = shape.triangles() if isinstance(shape, ShapeMesh) else None
+            half = mj.geom_aabb[g, 3:]
+            parts.append(Part(bone, shape, position[g], rotation[g], *box, half, surface))
     return Bones(tuple(names), tuple(parts))
 
 
@@ -144,13 +149,6 @@ def digest(spec: mujoco.MjSpec, names: Sequence[str]) -> str:
     return found.hexdigest()
 
 
-def _part(mj: mujoco.MjModel, geom: int, bone: int, position: Array, rotation: Array) -> Part:
-    shape = geom_shape(mj, geom)
-    box, half = box_of(mj, geom, position, rotation), mj.geom_aabb[geom, 3:]
-    surface = shape.triangles() if isinstance(shape, ShapeMesh) else None
-    return Part(bone, shape, position, rotation, *box, half, surface)
-
-
 def finest(bones: Bones, level: float) -> float:
     """Smallest distance between the samples of a contour, m."""
     low, high = bones.box
@@ -169,7 +167,4 @@ def contour(bones: Bones, level: float, pitch: float) -> Mesh:
     counts = np.ceil((high - low) / pitch).astype(int) + 5
     lattice = pv.ImageData(dimensions=counts, spacing=(pitch,) * 3, origin=low - 2.0 * pitch)
     distance = bones.distance(np.asarray(lattice.points, dtype=np.float64))
-    lattice.point_data["distance"] = distance
-    surface = lattice.contour([level], scalars="distance", method="flying_edges")
-    inward = surface.regular_faces.astype(np.int64)
-    return np.asarray(surface.points, dtype=np.float64), inward[:, ::-1]
+    return level_surface(lattice, distance, level)

@@ -18,10 +18,9 @@ import numpy as np
 from flowborne.base.phrases import location
 from flowborne.kernels import elastic
 from flowborne.kernels.arrays import Array, Integers, Mask
-from flowborne.solids.compiler import compiled_quietly
 from flowborne.solids.elements import lumped, measures, with_middles
 from flowborne.solids.geoms import rest_poses, rotation_of
-from flowborne.solids.mjcf import ARENA
+from flowborne.solids.mjcf import ARENA, compiled_quietly
 
 WORLD = "world"
 

@@ -16,7 +16,8 @@ from flowborne.base.phrases import location, rounded_up
 from flowborne.kernels.arrays import Array, Integers
 from flowborne.kernels.jit import numba_thread_count
 from flowborne.shapes.shape import Mesh
-from flowborne.solids.elements import connected, measures, oriented, outer_surface, with_middles
+from flowborne.shapes.thickness import connected
+from flowborne.solids.elements import measures, oriented, outer_surface, with_middles
 from flowborne.solids.tissue.bones import (
     MOST_SAMPLES,
     Bones,

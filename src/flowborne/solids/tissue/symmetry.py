@@ -10,12 +10,11 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from flowborne.base.extras import flesh_library
 from flowborne.kernels.arrays import Array, Integers, Mask
 from flowborne.shapes.shape import Mesh
+from flowborne.shapes.thickness import connected
 from flowborne.solids.elements import surface_of
 from flowborne.solids.tissue.bones import Bones, signed_distance
 
@@ -85,13 +84,13 @@ class Chamber:
         """(g, count) numbers of the images of points; two images share the points on the wall
         between them."""
         numbers = np.arange(len(self.images) * count).reshape(-1, count)
-        graph = coo_array((numbers.size,) * 2, dtype=np.float64)
+        pairs = [np.zeros((2, 0), np.int64)]
         for wall, on in zip(self.walls, on_wall, strict=True):
             across = self.images @ reflection(wall)
             apart = np.abs(across[:, None] - self.images[None]).max(axis=(2, 3))
-            pair = numbers[:, on].ravel(), numbers[apart.argmin(axis=1)][:, on].ravel()
-            graph = graph + coo_array((np.ones(pair[0].size), pair), shape=graph.shape)
-        return np.asarray(connected_components(graph, directed=False)[1]).reshape(-1, count)
+            partner = numbers[apart.argmin(axis=1)]
+            pairs.append(np.stack([numbers[:, on].ravel(), partner[:, on].ravel()]))
+        return connected(numbers.size, *np.concatenate(pairs, axis=1)).reshape(-1, count)
 
     def _on_walls(self, points: Array, elements: Integers, surface: Mesh, tolerance: float) -> Mask:
         """(k, n) for each wall, the points of faces that lie in it.
