@@ -27,12 +27,10 @@ import numpy as np
 from cmaes import CMA
 from numpy.typing import NDArray
 
-from flowborne import Measurement, Scene, Simulation, load_scene
+from flowborne import FrameReport, Measurement, Scene, Simulation, load_scene
 from flowborne.control.controller import Controller
 from flowborne.control.executors import Serial
 from flowborne.play.gym import ENVIRONMENTS, SceneEnv
-from flowborne.runs.frame_report import FrameReport
-from flowborne.sim.columns import drive_means
 
 Array = NDArray[np.float64]
 Data = dict[str, Any]
@@ -311,7 +309,7 @@ class Meter:
     def __call__(self, simulation: Simulation, report: FrameReport) -> float:
         measurement = Measurement(simulation.world, report.step)
         self._rewards.append(-self._controller.objective.value(measurement))
-        self._powers.append(float(drive_means(report)[1][self._controller.dofs].sum()))
+        self._powers.append(float(report.power()[self._controller.dofs].sum()))
         self._measures.append(self._task.measure(simulation, report))
         return self._rewards[-1]
 

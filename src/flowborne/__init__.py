@@ -25,22 +25,22 @@ if TYPE_CHECKING:
     from flowborne.control.controller import Controller, Decision, StrengthInPhase
     from flowborne.control.measurement import Measurement
     from flowborne.control.trial import Hypothesis, Velocities
-    from flowborne.coupling.named import BodyState, JointState
-    from flowborne.coupling.report import Momentum, Outcome, StepReport
+    from flowborne.coupling.report import Outcome, StepReport
     from flowborne.coupling.step import step
     from flowborne.coupling.stream import FlowState
     from flowborne.coupling.world import Fluid, Setup, World
     from flowborne.fluid.grid import Array, Faces, Grid
     from flowborne.fluid.state import FluidState
     from flowborne.formats.exporting import export
-    from flowborne.runs.frame_report import FrameReport
     from flowborne.runs.open_run import OpenRun, open_run
     from flowborne.runs.run_folder import RunFolderError
     from flowborne.scenes.load import load_scene
     from flowborne.scenes.schema import Scene
+    from flowborne.sim.frame import FrameReport, Snapshot
     from flowborne.sim.running import RunInterrupted, RunResult, run
-    from flowborne.sim.simulation import BlowUpError, Simulation, Snapshot
+    from flowborne.sim.simulation import BlowUpError, Simulation
     from flowborne.solids.model import SolidModel, SolidState
+    from flowborne.solids.sensed import BodyState, JointState
     from flowborne.solids.tissue.growth import Tissue
     from flowborne.studies.batch_page import Batch, ClipRun
     from flowborne.studies.batches import run_clips
@@ -69,7 +69,6 @@ __all__ = [
     "Imported",
     "JointState",
     "Measurement",
-    "Momentum",
     "OpenRun",
     "Outcome",
     "PartError",
@@ -119,7 +118,7 @@ _PLACES = {
     "Array": "flowborne.fluid.grid",
     "Batch": "flowborne.studies.batch_page",
     "BlowUpError": "flowborne.sim.simulation",
-    "BodyState": "flowborne.coupling.named",
+    "BodyState": "flowborne.solids.sensed",
     "Control": "flowborne.control.commands",
     "ClipRun": "flowborne.studies.batch_page",
     "Controller": "flowborne.control.controller",
@@ -129,13 +128,12 @@ _PLACES = {
     "FlowState": "flowborne.coupling.stream",
     "Fluid": "flowborne.coupling.world",
     "FluidState": "flowborne.fluid.state",
-    "FrameReport": "flowborne.runs.frame_report",
+    "FrameReport": "flowborne.sim.frame",
     "Grid": "flowborne.fluid.grid",
     "Hypothesis": "flowborne.control.trial",
     "Imported": "flowborne.characters.folder",
-    "JointState": "flowborne.coupling.named",
+    "JointState": "flowborne.solids.sensed",
     "Measurement": "flowborne.control.measurement",
-    "Momentum": "flowborne.coupling.report",
     "OpenRun": "flowborne.runs.open_run",
     "Outcome": "flowborne.coupling.report",
     "PartError": "flowborne.base.errors",
@@ -148,7 +146,7 @@ _PLACES = {
     "SceneError": "flowborne.base.errors",
     "Setup": "flowborne.coupling.world",
     "Simulation": "flowborne.sim.simulation",
-    "Snapshot": "flowborne.sim.simulation",
+    "Snapshot": "flowborne.sim.frame",
     "SolidModel": "flowborne.solids.model",
     "SolidState": "flowborne.solids.model",
     "StepReport": "flowborne.coupling.report",

@@ -20,8 +20,8 @@ from flowborne.control.executors import (
 from flowborne.kernels.jit import cores, kernel_threads
 from flowborne.kernels.vectors import turn
 from flowborne.runs.checkpoint import state_bytes
-from flowborne.runs.frame_report import PARTS
 from flowborne.runs.summary import peak_memory
+from flowborne.sim.frame import PARTS
 
 __all__ = [
     "GRACE",

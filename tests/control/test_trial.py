@@ -210,9 +210,7 @@ def test_blown_up_trial_says_what_was_tried(
     make_world: MakeWorld, step: Step, outcome: Outcome
 ) -> None:
     def blow_up(world: World, dt: float, command: JointCommand | None = None) -> StepReport:
-        report = step(world, dt, command)
-        report.outcome = outcome
-        return report
+        return replace(step(world, dt, command), outcome=outcome)
 
     with pytest.raises(
         TrialError, match=rf"shoulder by 0\.25 at time 0 s, {outcome.value}; try a smaller"

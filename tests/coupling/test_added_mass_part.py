@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from flowborne import FrameReport, Grid
+from flowborne import FrameReport, Grid, StepReport
 from flowborne.coupling.step import step
 from flowborne.solids.trajectories import JointCommand
 from flowborne.worlds import Boundaries, BoundaryInflow, BoundaryOpen, make_world
@@ -61,8 +61,8 @@ def test_the_means_of_a_frame_add_up_to_the_impulse_that_it_gave():
     steps = tuple(driven(world, v, dt) for v, dt in ((0.2, 0.01), (0.3, 0.005), (-0.1, 0.01)))
     nothing = np.zeros(0)
     frame = FrameReport(1, world.time, steps, np.nan, {}, nothing, nothing, False, {})
-    whole = (frame.drag() + frame.central_added_mass()[:, :3])[1]
-    given = sum(report.momentum.exchanged for report in steps)
+    whole = (frame.drag() + frame.mean(StepReport.central_added_mass)[:, :3])[1]
+    given = sum(report.momentum_exchanged for report in steps)
     np.testing.assert_allclose(0.025 * whole, given, atol=1e-13 * abs(given[0]))
 
 

@@ -149,7 +149,7 @@ def test_the_dye_of_a_jet_in_space_is_as_much_as_was_blown_and_never_more_than_t
     world = World.at_rest(replace(plain.setup, mouths=(mouth,)))
     _, state = world.flow()
     for _ in range(12):
-        assert step(world, 0.01).dye_error < 1e-13
+        assert step(world, 0.01).dye_budget_error < 1e-13
         dye = state.scalars["dye"]
         assert 0.0 <= dye.min() < dye.max() <= 1.0
         if not dye[-1].any():

@@ -42,9 +42,9 @@ def impulses(world: World) -> tuple[Array, Array, Array]:
     pressed, blown, made = np.zeros(3), np.zeros(3), np.zeros(3)
     for _ in range(steps):
         report = step(world, DURATION / steps)
-        pressed += report.momentum.exchanged
+        pressed += report.momentum_exchanged
         blown += report.jet_wrench[1, :3] * report.dt
-        made += report.momentum.advection
+        made += report.momentum_advection
     return pressed, blown, made
 
 

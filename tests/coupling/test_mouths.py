@@ -112,20 +112,20 @@ def test_body_fluid_and_what_fills_the_body_keep_their_momentum(
         (jet,) = jets_at(world, cut_by_bodies(world), world.time)
         report = step(world, dt)
         assert report.outcome.name == "DONE"
-        budget, thrust = report.momentum, dt * report.jet_wrench[1, :3]
+        thrust = dt * report.jet_wrench[1, :3]
         scale = fluid.density * rate**2 / area * dt
         if rate > 0.0:
             np.testing.assert_allclose(thrust, -scale * jet.along, atol=1e-12 * scale)
         filled = fluid.density * rate * dt * jet.skin
-        np.testing.assert_allclose(budget.jet + thrust, filled, atol=1e-12 * scale)
+        np.testing.assert_allclose(report.momentum_jet + thrust, filled, atol=1e-12 * scale)
         friction = dt * report.viscous_wrench[1, :3]
         gained = mass * (world.solid.v[:3] - velocity)
-        given = budget.exchanged + friction + thrust
+        given = report.momentum_exchanged + friction + thrust
         np.testing.assert_allclose(gained, given, atol=1e-10 * scale)
-        outside = budget.boundary + budget.crossed + budget.advection
+        outside = report.momentum_boundary + report.momentum_crossed + report.momentum_advection
         whole = gained + momentum_of(world) - was
         np.testing.assert_allclose(whole, filled + outside, atol=1e-10 * scale)
-        assert budget.exchange_error < 1e-10
+        assert report.momentum_exchange_error < 1e-10
 
 
 def test_a_jet_that_starts_pushes_as_the_bodys_own_potential_flow_says() -> None:
@@ -152,7 +152,7 @@ def test_thrust_on_a_held_disc_is_the_momentum_of_its_jet() -> None:
     for _ in range(60):
         report = advance(world, dt)
         total += report.fluid_wrench()[1, :3] / 60
-        lost += report.momentum.advection / 60
+        lost += report.momentum_advection / 60
     force = RATE * speed
     np.testing.assert_allclose(total[:2], [-force, 0.0], atol=0.1 * force)
     assert np.abs(lost).max() < 0.2 * force * dt
@@ -195,7 +195,7 @@ def test_a_mouth_that_drinks_takes_the_dye_that_is_there(grid: Grid) -> None:
     area = 0.24 if grid.is_slab else np.pi * 0.12**2
     for _ in range(12):
         report = advance(world, 0.5 * grid.spacing * area / RATE)
-        assert report.dye_error < 1e-13
+        assert report.dye_budget_error < 1e-13
         outside = state.cell_volume > 0.0
         np.testing.assert_allclose(state.scalars["dye"][outside], 1.0, rtol=1e-12)
 
@@ -211,7 +211,7 @@ def test_a_mouth_drinks_again_the_dye_that_it_blew(grid: Grid) -> None:
     amount = [0.0]
     for _ in range(36):
         report = advance(world, dt)
-        assert report.dye_error < 1e-13
+        assert report.dye_budget_error < 1e-13
         dye = state.scalars["dye"]
         assert 0.0 <= dye.min() <= dye.max() <= 1.0
         amount.append(float(np.vdot(state.cell_volume, dye)))

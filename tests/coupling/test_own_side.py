@@ -45,4 +45,4 @@ def test_added_mass_of_a_disc_set_going(side: Boundary, endless: float) -> None:
     report = step(world, dt, command)
     found = -report.pressure_wrench[-1, 0] * dt / math.pi
     assert found == pytest.approx(endless, abs=0.01)
-    assert report.momentum.budget_error < 1e-10
+    assert report.momentum_budget_error < 1e-10

@@ -170,5 +170,5 @@ def test_nor_in_what_swims_in_a_ring_of_water() -> None:
         tolerance=1e-11,
     )
     start(world, 0.1)
-    momentum = advance(world, 0.1).momentum
-    assert np.abs(momentum.fluid + momentum.solid).max() < 1e-3 * tail_momentum(world)
+    report = advance(world, 0.1)
+    assert np.abs(report.momentum_fluid + report.momentum_solid).max() < 1e-3 * tail_momentum(world)

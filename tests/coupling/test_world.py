@@ -12,7 +12,8 @@ from flowborne.coupling import cut
 from flowborne.coupling.fractions import Geometry
 from flowborne.coupling.step import step
 from flowborne.coupling.world import Setup, World
-from flowborne.sim.simulation import Simulation, Snapshot
+from flowborne.sim.frame import Snapshot
+from flowborne.sim.simulation import Simulation
 from flowborne.solids.dynamics import Kinematics
 
 SMALL = {"domain.resolution": "32", "time.frames": "4"}

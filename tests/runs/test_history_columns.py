@@ -35,8 +35,8 @@ def test_columns_go_to_their_joint_body_and_axis() -> None:
     history = {column: np.array([value]) for column, value in COLUMNS.items()}
     found = history_arrays(history, BODIES, JOINTS)
     places = {
-        name: (array.dimensions, array.unit, *np.argwhere(np.isfinite(array.values[0])).tolist())
-        for name, array in found.items()
+        name: (quantity.dimensions, quantity.unit, *np.argwhere(np.isfinite(values[0])).tolist())
+        for name, (quantity, values) in found.items()
     }
     assert places == {
         "angle": (("joint",), "rad", [3]),
@@ -54,6 +54,6 @@ def test_columns_go_to_their_joint_body_and_axis() -> None:
         "divergence": ((), "1/s", []),
         "measured_drag": ((), "", []),
     }
-    finite = [float(np.nansum(array.values)) for array in found.values()]
+    finite = [float(np.nansum(values)) for _, values in found.values()]
     assert_array_equal(finite, [2, 3, 4, 5, 6, 7, 8, 9, 10, 13, 14, 15, 16, 17])
     assert unit_of("power_neck_W") == "W"

@@ -67,7 +67,7 @@ def test_it_swims_forward_and_straight() -> None:
     with Simulation(load_scene("fish-robot", settings)) as simulation:
         for _ in range(54):
             report = simulation.advance_frame().step
-            worst = max(worst, report.momentum.exchange_error, report.momentum.budget_error)
+            worst = max(worst, report.momentum_exchange_error, report.momentum_budget_error)
         x, y, heading = simulation.world.solid.q[:3]
     assert worst < 1e-10
     assert -0.10 < x < -0.03

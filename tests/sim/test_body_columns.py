@@ -5,7 +5,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flowborne import FrameReport, Grid, SceneError, Simulation, StepReport, World, load_scene, step
+from flowborne import (
+    FrameReport,
+    Grid,
+    SceneError,
+    Simulation,
+    Snapshot,
+    StepReport,
+    World,
+    load_scene,
+    step,
+)
 from flowborne.bodies import TrajectorySinusoid, WindForce
 from flowborne.sim.columns import Columns
 from flowborne.worlds import make_world
@@ -17,10 +27,11 @@ BALL = (
 )
 
 
-def frame_of(world: World, report: StepReport) -> FrameReport:
-    """A frame of one step, without a controller."""
+def end_of(world: World, report: StepReport) -> Snapshot:
+    """The end of a frame of one step, without a controller."""
     none = np.zeros(0)
-    return FrameReport(1, world.time, (report,), np.nan, {}, none, none, False, {})
+    frame = FrameReport(1, world.time, (report,), np.nan, {}, none, none, False, {})
+    return Snapshot(world, 1, frame)
 
 
 def test_velocity_of_a_free_body_is_that_where_it_is():
@@ -33,7 +44,7 @@ def test_velocity_of_a_free_body_is_that_where_it_is():
     dt, path, told = 0.002, [], []
     columns = Columns(world.setup, bodies=("ball",))
     for _ in range(5):
-        values = columns.values(world, 1, frame_of(world, step(world, dt)))
+        values = columns.values(end_of(world, step(world, dt)))
         path.append(values["ball_centre_x_m"])
         told.append(values["ball_velocity_x_m/s"])
     assert world.parts == 1, "the path is known at the end of every part"
@@ -50,7 +61,7 @@ def test_force_of_a_wind_is_told_with_its_torque_about_the_centre_of_mass():
         winds=(WindForce((3.0, 2.0, 0.0), ("ball",)),),
     )
     columns = Columns(world.setup, bodies=("ball",))
-    values = columns.values(world, 1, frame_of(world, step(world, 0.01)))
+    values = columns.values(end_of(world, step(world, 0.01)))
     assert [values[f"ball_force_{a}_N"] for a in "xyz"] == pytest.approx([3.0, 2.0, 0.0])
     assert [values[f"ball_torque_{a}_Nm"] for a in "xyz"] == pytest.approx([0.0, 0.0, 0.0])
 
@@ -62,7 +73,7 @@ def test_velocity_of_a_driven_body_is_told_where_the_body_is():
     columns = Columns(world.setup, bodies=("ball",))
     for _ in range(3):
         report = step(world, 0.02)
-    values = columns.values(world, 1, frame_of(world, report))
+    values = columns.values(end_of(world, report))
     before, after = (told.position(world.time + sign * 0.02)[0] for sign in (-1.0, 1.0))
     assert values["ball_velocity_x_m/s"] == pytest.approx((after - before) / 0.04, rel=1e-12)
     assert values["ball_velocity_x_m/s"] == pytest.approx(told.velocity(world.time)[0], rel=3e-3)

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from flowborne import FrameReport, Grid, Setup, SolidModel, World, step
+from flowborne import FrameReport, Grid, Setup, Snapshot, SolidModel, World, step
 from flowborne.sim.columns import Columns, axes_of
 from flowborne.solids.geoms import quaternion_of
 from flowborne.worlds import Boundaries, BoundaryInflow, BoundaryOpen, cut_by_bodies, make_world
@@ -29,7 +29,7 @@ def test_joints_and_bodies_are_told_with_their_units():
     world = World(Setup(model), model.rest(), time=0.5)
     world.solid.q[:] = [3.0, np.pi / 2]
     columns = Columns(world.setup)
-    values = columns.values(world, 12, None)
+    values = columns.values(Snapshot(world, 12, None))
     assert tuple(values) == columns.names
     assert (values["frame"], values["time_s"]) == (12, 0.5)
     assert (values["position_rail_m"], values["angle_hinge_rad"]) == (3.0, np.pi / 2)
@@ -60,8 +60,8 @@ def test_fastest_is_the_largest_speed_of_any_step_across_an_open_face():
     none = np.zeros(0)
     frame = FrameReport(1, world.time, tuple(steps), np.nan, {}, none, none, False, {})
     assert largest[0] > 1.5 * largest[1] > 1.5
-    assert columns.values(world, 1, frame)["fastest_m/s"] == largest[0]
-    assert np.isnan(columns.values(world, 0, None)["fastest_m/s"])
+    assert columns.values(Snapshot(world, 1, frame))["fastest_m/s"] == largest[0]
+    assert np.isnan(columns.values(Snapshot(world, 0, None))["fastest_m/s"])
 
 
 @pytest.mark.parametrize(

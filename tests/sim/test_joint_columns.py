@@ -54,7 +54,7 @@ def missing_energy(steps: int) -> float:
     before, work = energy(world, dt), 0.0
     for _ in range(20):
         frame = frame_of(world, dt, steps)
-        row = columns.values(world, 1, frame)
+        row = columns.values(fb.Snapshot(world, 1, frame))
         assert frame_time * row["power_rail_W"] == pytest.approx(sum(s.work for s in frame.steps))
         work += frame_time * row["power_rail_W"]
     assert abs(work) > 0.5
@@ -72,7 +72,7 @@ def test_force_and_power_are_means_over_the_frame() -> None:
     drive = TrajectorySinusoid(np.array([0]), 0.3, PERIOD)
     world = make_world(CART, slab=False, motions=(drive,))
     frame = frame_of(world, 0.01, 5)
-    row = Columns(world.setup).values(world, 1, frame)
+    row = Columns(world.setup).values(fb.Snapshot(world, 1, frame))
     forces = [step.actuator[0] for step in frame.steps]
     assert row["force_rail_N"] == pytest.approx(np.mean(forces))
     assert np.ptp(forces) > 0.1 * abs(row["force_rail_N"])
@@ -99,7 +99,7 @@ def test_a_ball_joint_has_three_torques() -> None:
     """3 kg, held 1 m to the side."""
     world = make_world(BALL, slab=False, gravity=(0.0, 0.0, -9.81), motions=(HeldBall(),))
     columns = Columns(world.setup)
-    row = columns.values(world, 1, frame_of(world, 0.01, 2))
+    row = columns.values(fb.Snapshot(world, 1, frame_of(world, 0.01, 2)))
     assert list(row) == list(columns.names)
     assert_allclose([row[f"torque_shoulder_{a}_Nm"] for a in "xyz"], [0.0, -29.43, 0.0], atol=1e-9)
     assert row["power_shoulder_W"] == 0.0
@@ -131,7 +131,7 @@ def test_joints_are_chosen_as_the_scene_says() -> None:
         "force_head_x_N",
         "power_head_x_W",
     }
-    row = every.values(replace(eel, time=0.75), 0, None)
+    row = every.values(fb.Snapshot(replace(eel, time=0.75), 0, None))
     wave = np.radians(20.0) * (3 * 0.75**2 - 2 * 0.75**3)
     assert row["target_joint_3_rad"] == pytest.approx(wave * np.sin(2 * np.pi * (0.375 - 0.42)))
     assert np.isnan(row["torque_joint_3_Nm"])

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -76,32 +78,36 @@ class Failing:
     def __call__(self, world, dt, command):
         report = self.step(world, dt, command)
         if world.steps == self.at:
-            self.fail(world, report)
+            return self.fail(world, report)
         return report
 
 
 def lose_a_number(world, report):
     world.solid.v[0] = np.nan
+    return report
 
 
 def spin(world, report):
     world.solid.v[0] = 4.0 / report.dt
+    return report
 
 
 def diverge(world, report):
-    report.outcome, report.residual, report.iterations = Outcome.PRESSURE_NOT_CONVERGED, 0.5, 200
+    outcome = Outcome.PRESSURE_NOT_CONVERGED
+    return replace(report, outcome=outcome, residual=0.5, solver_iterations=200)
 
 
 def stay_viscous(world, report):
-    report.outcome, report.residual, report.iterations = Outcome.VISCOSITY_NOT_CONVERGED, 0.5, 200
+    outcome = Outcome.VISCOSITY_NOT_CONVERGED
+    return replace(report, outcome=outcome, residual=0.5, solver_iterations=200)
 
 
 def rattle(world, report):
-    report.outcome, report.unsettled = Outcome.NOT_SETTLED, np.array([0])
+    return replace(report, outcome=Outcome.NOT_SETTLED, unsettled=np.array([0]))
 
 
 def creep(world, report):
-    report.outcome = Outcome.NOT_SETTLED
+    return replace(report, outcome=Outcome.NOT_SETTLED)
 
 
 def lose_an_inverse(world, report):

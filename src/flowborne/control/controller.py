@@ -322,7 +322,7 @@ class Controller:
         their sum. Dofs that are told are left out, and groups without an active term, except on a
         plan, where terms can become active later."""
         knots = self.dofs.size * np.arange(size // self.dofs.size)[:, None]
-        told, groups = np.isin(self.dofs, world.setup.told.dofs()), []
+        told, groups = np.isin(self.dofs, world.told.dofs()), []
         for indices, objective in self.objective.group_by_joints(self.dofs):
             left = indices[~told[indices]]
             if left.size and (isinstance(self.hypothesis, Horizon) or objective.active(world.time)):

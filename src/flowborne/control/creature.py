@@ -16,15 +16,15 @@ from flowborne.solids.model import SolidState
 from flowborne.solids.trajectories import JointCommand, Servo
 
 if TYPE_CHECKING:
-    from flowborne.coupling.world import Setup, World
+    from flowborne.coupling.world import World
     from flowborne.solids.model import SolidModel
 
 
-def given(setup: Setup) -> Mask:
+def given(world: World) -> Mask:
     """(nv,) dofs whose velocity the controller cannot choose: prescribed, told and locked ones."""
-    mask = np.asarray(setup.solid.locked, dtype=bool).copy()
-    mask[setup.told.dofs()] = True
-    for motion in setup.motions:
+    mask = np.asarray(world.setup.solid.locked, dtype=bool).copy()
+    mask[world.told.dofs()] = True
+    for motion in world.setup.motions:
         mask[motion.dofs] = True
     return mask
 
@@ -32,7 +32,7 @@ def given(setup: Setup) -> Mask:
 def outboard(world: World, dofs: Integers) -> Integers:
     """Free dofs outboard of any of `dofs`, in ascending order, without `dofs` themselves."""
     below = outboard_dofs(world.setup.solid, dofs)
-    own = given(world.setup)
+    own = given(world)
     own[dofs] = True
     return below[~own[below]]
 
@@ -45,7 +45,7 @@ def give_velocity(world: World, dofs: Integers, velocity: Array, kept: Integers)
     source  Lentine et al. 2011, sections 3.3 and 5
     """
     model, state = world.setup.solid, world.solid
-    fixed = given(world.setup)
+    fixed = given(world)
     fixed[kept] = True
     wanted = np.zeros(model.nv)
     wanted[dofs] = velocity

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flowborne.control import creature
-from flowborne.coupling.named import BodyState, JointState, Named
 from flowborne.coupling.report import StepReport
 from flowborne.kernels.arrays import Array, Integers
 from flowborne.solids.dynamics import Kinematics, kinematics
 from flowborne.solids.momentum import momentum
+from flowborne.solids.sensed import BodyState, JointState, Sensed
 
 if TYPE_CHECKING:
     from flowborne.coupling.world import World
@@ -55,16 +55,16 @@ class Measurement:
         return kinematics(self.world.setup.solid, self.world.solid.q)
 
     @cached_property
-    def _named(self) -> Named:
-        return Named.after(self.world, self.report)
+    def _sensed(self) -> Sensed:
+        return self.report.sensed(self.world)
 
     def body(self, name: str) -> BodyState:
         """The state of a body. Raises ValueError for an unknown name."""
-        return self._named.body(name)
+        return self._sensed.body(name)
 
     def joint(self, name: str) -> JointState:
         """The state of a joint. Raises ValueError for an unknown name."""
-        return self._named.joint(name)
+        return self._sensed.joint(name)
 
     def joint_positions(self, dofs: Integers) -> Array:
         """(k,) positions of scalar joints, rad or m; NaN for dofs of ball and free joints."""

@@ -148,7 +148,7 @@ class PoseCourse(Course):
         in the displacement.
         """
         hypothesis, rigid, v = self.hypothesis, self.rigid, world.solid.v
-        own = ~np.isin(self.dofs, world.setup.told.dofs())
+        own = ~np.isin(self.dofs, world.told.dofs())
         dofs = self.dofs[own]
         rate = displacement[own] / hypothesis.duration
         if hypothesis.velocities == "present":

@@ -12,7 +12,7 @@ import numpy as np
 
 from flowborne.coupling.drives import joint_command
 from flowborne.coupling.operators import generalised, twists
-from flowborne.coupling.report import StepReport, Timer
+from flowborne.coupling.report import StepReport, timed
 from flowborne.coupling.solve import solve_bodies
 from flowborne.coupling.step_report import report_bodies
 from flowborne.coupling.stream import winds_on
@@ -50,26 +50,26 @@ def equations(
 ) -> Driven:
     """The bodies' own equations of motion under a generalised force (nv,), with the drives."""
     goal, limit, model = command.final_velocity, command.torque_limit, world.setup.solid
-    force = force + world.setup.told.force_on(model.nv)
+    force = force + world.told.force_on(model.nv)
     return drive(model, world.solid, force, dt, before, command.prescribed, goal, limit)
 
 
-def step_bodies(
-    world: World, dt: float, command: JointCommand, done: StepReport, timer: Timer
-) -> None:
+@timed("solids")
+def step_bodies(world: World, dt: float, command: JointCommand) -> StepReport:
     """A step without a fluid, in place: simple winds, gravity, joints and contact."""
     model, before, force = world.setup.solid, world.solid.copy(), np.zeros(world.setup.solid.nv)
     move_bodies(world, command, dt)
+    known: dict[str, Array] = {}
     if world.setup.winds:
         pose = kinematics(model, world.solid.q)
-        done.centre, done.wind_wrench = pose.mass_centre, winds_on(world, pose)
-        force = generalised(pose, np.append(done.wind_wrench, np.zeros(pose.vertices.size)))
+        wind = winds_on(world, pose)
+        force = generalised(pose, np.append(wind, np.zeros(pose.vertices.size)))
+        known = {"centre": pose.mass_centre, "wind_wrench": wind}
     driven = equations(world, before, force, command, dt)
-    solved = solve_bodies(driven, command.torque_limit, 6 * model.nbody)
+    solved = solve_bodies(driven, command.torque_limit)
     world.solid.v[:] = solved.v
     world.advance_clock(dt)
-    report_bodies(done, world, solved)
-    timer.lap("solids")
+    return report_bodies(world, dt, solved, known)
 
 
 def advance_prescribed(world: World, dt: float, command: JointCommand) -> bool:

@@ -11,6 +11,7 @@ import numpy as np
 from flowborne.coupling.flesh import skins_on
 from flowborne.coupling.fractions import Geometry, geometry
 from flowborne.coupling.mouths import Jet, add_rates, jet_of
+from flowborne.coupling.report import timed
 from flowborne.coupling.world import Fluid, Setup, World
 from flowborne.fluid.boundary import cells_in
 from flowborne.fluid.control_volumes import (
@@ -27,6 +28,7 @@ from flowborne.solids.dynamics import Kinematics, kinematics
 from flowborne.solids.model import SolidModel, SolidState
 
 
+@timed("geometry")
 def cut_by_bodies(world: World, pose: Kinematics | None = None) -> Geometry:
     """The grid cut by the bodies at their positions: once for each pose, and kept in the world.
 
@@ -114,6 +116,7 @@ class Departure:
     bodies: SolidState
 
 
+@timed("geometry")
 def departure(world: World) -> Departure:
     """Fluid and bodies at the start of a step."""
     fluid, state = world.flow()

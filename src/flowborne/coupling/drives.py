@@ -19,7 +19,7 @@ def joint_command(world: World, dt: float, command: JointCommand | None) -> Join
     """
     model, end = world.setup.solid, world.time + dt
     command = JointCommand.none(model.nv) if command is None else command.copy()
-    told = world.setup.told
+    told = world.told
     for motion in (*world.setup.motions, *told.motions):
         if isinstance(motion, TrajectoryServo):
             v = world.solid.v[motion.dofs]

@@ -19,7 +19,7 @@ from flowborne.coupling.mouths import (
     taken_by,
 )
 from flowborne.coupling.operators import boundary_velocity, leak_proof
-from flowborne.coupling.solve import Solved
+from flowborne.coupling.solve import SolvedFlow
 from flowborne.coupling.world import Fluid, World
 from flowborne.fluid.boundary import cells_in
 from flowborne.fluid.control_volumes import ControlVolumes, control_volumes
@@ -147,22 +147,20 @@ def store_state(
     half: HalfPressure,
     advected: AdvectionResult,
     dyed: Dyed,
-    solved: Solved,
+    solved: SolvedFlow,
     cut: Geometry,
     pose: Kinematics,
 ) -> None:
     """The state at the end of the step, in place: what was solved for, and what the step changed.
 
-    Faces without fluid have the velocity of the leak-proof field; `solved.projected.velocity` gets
+    Faces without fluid have the velocity of the leak-proof field; `solved.velocity` gets
     it too, and becomes the state's own. Cells that the solve leaves out have no pressure: no fluid
     would give what half of their last one gave to bodies.
     """
     fluid, state = world.flow()
     grid, sides, volumes = fluid.grid, fluid.boundaries, advected.volumes
-    dt, projected = solved.driven.system.dt, solved.projected
-    assert projected is not None
+    dt, velocity = solved.driven.system.dt, solved.velocity
     world.solid.v[:], world.volumes = solved.v, (cut, volumes)
-    velocity = projected.velocity
     inside = leak_proof(velocity, cut, boundary_velocity(pose, solved.v), grid)
     for axis in grid.axes:
         np.copyto(velocity[axis], inside[axis], where=volumes.moving[axis] == 0.0)
@@ -177,8 +175,8 @@ def store_state(
                 values[edge(axis, -1)] = values[edge(axis, 0)]
     state.velocity, state.velocity_change = velocity, state.velocity
     state.previous_pressure = state.pressure + half.pressure
-    left_out = projected.pressure == 0.0
-    state.pressure = np.where(left_out, 0.0, half.pressure + projected.pressure)
+    left_out = solved.pressure == 0.0
+    state.pressure = np.where(left_out, 0.0, half.pressure + solved.pressure)
     state.cell_volume, state.pose = volumes.cells, world.solid.q.copy()
     state.scalars = dyed.scalars
     world.advance_clock(dt)

@@ -32,7 +32,7 @@ class HalfPressure:
 
     velocity  Faces of the fluid with it, m/s
     pressure  (nx, ny, nz) of which it is made, Pa
-    impulse   (k,) on the bodies, see `Projected`
+    impulse   (k,) on the bodies, see `SolvedFlow`
     sides     (3,) impulse of the sides on the fluid, N s
     start     (3,) momentum of the fluid without it, N s
     """

@@ -2,17 +2,29 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass, field
 from enum import Enum
+from functools import partial
+from operator import itemgetter
 from time import perf_counter
+from typing import Annotated, Any, NamedTuple, get_type_hints
 
 import numpy as np
 
 from flowborne.base.errors import BreakdownError, PartError, WorkerError
+from flowborne.coupling.world import World
 from flowborne.kernels.arrays import Array, Integers
+from flowborne.solids.sensed import Sensed
 
 BREAKDOWNS = ArithmeticError, np.linalg.LinAlgError, BreakdownError, PartError, WorkerError
 """Errors with which a step may end; their text says what happened."""
+
+Rule = Callable[[Sequence[Any]], Any]
+"""Makes one value of several ones in the order of time."""
 
 
 class Outcome(Enum):
@@ -26,42 +38,51 @@ class Outcome(Enum):
     ADVECTION_NOT_FINITE = "a velocity of the fluid is not a finite number after advection"
 
 
-@dataclass
-class Momentum:
-    """Linear momentum budget of a step, N s, each (3,); angular parts are about the origin.
+last = itemgetter(-1)
+mean = partial(np.mean, axis=0)
+total = partial(np.sum, axis=0)
 
-    solid            momentum of the bodies half a step on, which keeps what it is given exactly
-                     (see solids.momentum.halfway_momentum)
-    fluid            momentum of the fluid (density x control volume of each face)
-    exchanged        impulse that the pressure solve gave to the bodies
-    exchange_error   |impulse given to the bodies + impulse taken from the fluid and the walls|
-                     relative to the impulses given to bodies and faces, added up in size
-    advection        change of the fluid's momentum in advection that no boundary accounts for: none
-                     in flux form
-    boundary         impulse of the sides of the domain on the fluid: their pressure, and what they
-                     stop of the flow that reaches them
-    crossed          momentum that the flow itself carried in through the sides
-    jet              momentum that came into the fluid through mouths and sources
-    forces           what body forces, driven regions and friction at walls and bodies gave to it
-    budget_error     |change of the fluid's momentum in the step less all of these| relative to the
-                     impulses given to bodies and faces
+
+def union(values: Sequence[Integers]) -> Integers:
+    return np.unique(np.concatenate(values))
+
+
+class Joined(NamedTuple):
+    """How a field of a report is made of several: that of a step of those of its parts, and that of
+    a frame, which is a column of the history, of those of its steps.
+
+    parts, frame  rules; None where there is no column
+    unit          suffix of the column
+    axes          suffixes of the three columns of a vector
     """
 
-    solid: Array = field(default_factory=lambda: np.zeros(3))
-    fluid: Array = field(default_factory=lambda: np.zeros(3))
-    exchanged: Array = field(default_factory=lambda: np.zeros(3))
-    exchange_error: float = 0.0
-    advection: Array = field(default_factory=lambda: np.zeros(3))
-    boundary: Array = field(default_factory=lambda: np.zeros(3))
-    crossed: Array = field(default_factory=lambda: np.zeros(3))
-    jet: Array = field(default_factory=lambda: np.zeros(3))
-    forces: Array = field(default_factory=lambda: np.zeros(3))
-    budget_error: float = 0.0
+    parts: Rule
+    frame: Rule | None = None
+    unit: str = ""
+    axes: str = ""
 
 
-@dataclass
+Mean = Annotated[Array, Joined(mean)]
+Last = Annotated[Array, Joined(last)]
+Momentum = Annotated[Array, Joined(last, last, "Ns", "xyz")]
+Impulse = Annotated[Array, Joined(total, total, "Ns", "xyz")]
+Worst = Annotated[float, Joined(max, max)]
+
+
+no_momentum = partial(np.zeros, 3)
+
+
+def no_dofs() -> Integers:
+    return np.zeros(0, np.int64)
+
+
+@dataclass(frozen=True, eq=False)
 class StepReport:
     """What `step` did.
+
+    Momenta and impulses are linear, (3,), N s. Errors of their exchange and of the budget are
+    relative to the impulses given to bodies and faces, added up in size. The history has columns
+    of the same names, with a suffix for the unit, of all from `work` to `fastest`.
 
     dt               s
     velocity         (nv,) at the end of the step: v is that half a step before, then half a step
@@ -79,46 +100,74 @@ class StepReport:
                      does not split forces, as in trials
     centre           (nbody, 3) centres of mass at the end of the step, m; 0 where neither a fluid
                      nor a wind acts
-    iterations       of the pressure solves
-    residual         true relative residual of the last of them
-    divergence       largest |net volume flux of a cell| / cell volume after the solve, 1/s
-    fastest          largest speed of the fluid across an open face after the solve, m/s
-    momentum         the budget
     work             of the drives, J
+    momentum_solid   of the bodies half a step on, which keeps what it is given exactly
+                     (see solids.momentum.halfway_momentum)
+    momentum_fluid   of the fluid (density x control volume of each face)
+    momentum_exchanged
+                     impulse that the pressure solve gave to the bodies
+    momentum_advection
+                     change of the fluid's momentum in advection that no boundary accounts for: none
+                     in flux form
+    momentum_boundary
+                     impulse of the sides of the domain on the fluid: their pressure, and what they
+                     stop of the flow that reaches them
+    momentum_crossed carried in by the flow itself through the sides
+    momentum_forces  given to the fluid by body forces, driven regions and friction at walls and
+                     bodies
+    momentum_jet     brought into the fluid by mouths and sources
     expelled         volume that mouths expelled, less what they took in, m^3
-    dye_error        |change of the amount of a dye less what was brought| relative to it, the
+    momentum_exchange_error
+                     |impulse given to the bodies + impulse taken from the fluid and the walls|
+    momentum_budget_error
+                     |change of the fluid's momentum in the step less all of these|
+    divergence       largest |net volume flux of a cell| / cell volume after the solve, 1/s
+    dye_budget_error |change of the amount of a dye less what was brought| relative to it, the
                      largest of all dyes
-    seconds          where the time went: advection, viscosity, projection, geometry, solids
+    solver_iterations
+                     of the pressure solves
+    residual         true relative residual of the last of them
     contacts         number of active contacts
+    fastest          largest speed of the fluid across an open face after the solve, m/s
+    seconds          where the time went: advection, viscosity, projection, geometry, solids
     limited          (k,) dofs whose torque limit was reached
     unsettled        (k,) dofs whose contacts, joint limits or drives still changed when the step
                      gave up; none when Coriolis forces alone did
     """
 
-    dt: float
-    outcome: Outcome
-    velocity: Array
-    acceleration: Array
-    actuator: Array
-    pressure_wrench: Array
-    viscous_wrench: Array
-    buoyancy_wrench: Array
-    wind_wrench: Array
-    jet_wrench: Array
-    added_mass_wrench: Array
-    centre: Array
-    iterations: int = 0
-    residual: float = 0.0
-    divergence: float = 0.0
-    fastest: float = 0.0
-    momentum: Momentum = field(default_factory=Momentum)
-    work: float = 0.0
-    expelled: float = 0.0
-    dye_error: float = 0.0
-    seconds: dict[str, float] = field(default_factory=dict)
-    contacts: int = 0
-    limited: Integers = field(default_factory=lambda: np.zeros(0, np.int64))
-    unsettled: Integers = field(default_factory=lambda: np.zeros(0, np.int64))
+    dt: Annotated[float, Joined(sum)]
+    outcome: Annotated[Outcome, Joined(last)]
+    velocity: Last
+    acceleration: Last
+    actuator: Mean
+    pressure_wrench: Mean
+    viscous_wrench: Mean
+    buoyancy_wrench: Mean
+    wind_wrench: Mean
+    jet_wrench: Mean
+    added_mass_wrench: Mean
+    centre: Mean
+    work: Annotated[float, Joined(sum, sum, "J")] = 0.0
+    momentum_solid: Momentum = field(default_factory=no_momentum)
+    momentum_fluid: Momentum = field(default_factory=no_momentum)
+    momentum_exchanged: Impulse = field(default_factory=no_momentum)
+    momentum_advection: Impulse = field(default_factory=no_momentum)
+    momentum_boundary: Impulse = field(default_factory=no_momentum)
+    momentum_crossed: Impulse = field(default_factory=no_momentum)
+    momentum_forces: Impulse = field(default_factory=no_momentum)
+    momentum_jet: Impulse = field(default_factory=no_momentum)
+    expelled: Annotated[float, Joined(sum, sum, "m3")] = 0.0
+    momentum_exchange_error: Worst = 0.0
+    momentum_budget_error: Worst = 0.0
+    divergence: Annotated[float, Joined(max, max, "1/s")] = 0.0
+    dye_budget_error: Worst = 0.0
+    solver_iterations: Annotated[int, Joined(sum, max)] = 0
+    residual: Annotated[float, Joined(last, max)] = 0.0
+    contacts: Annotated[int, Joined(last, max)] = 0
+    fastest: Annotated[float, Joined(max, max, "m/s")] = 0.0
+    seconds: Annotated[dict[str, float], Joined(last)] = field(default_factory=dict)
+    limited: Annotated[Integers, Joined(union)] = field(default_factory=no_dofs)
+    unsettled: Annotated[Integers, Joined(last)] = field(default_factory=no_dofs)
 
     def fluid_wrench(self) -> Array:
         """(nbody, 6) everything that the fluid and the winds do to each body."""
@@ -133,6 +182,12 @@ class StepReport:
         """(nbody, 6) `added_mass_wrench` about each body's centre of mass."""
         return about(self.added_mass_wrench, self.centre)
 
+    def sensed(self, world: World) -> Sensed:
+        """What can be sensed of the bodies and joints of `world` after the step."""
+        state = self.velocity, self.acceleration, self.dt, self.actuator
+        wrenches = self.central_wrench(), self.central_added_mass()
+        return Sensed(world.setup.solid, world.solid.q, *state, *wrenches)
+
 
 def about(wrench: Array, points: Array) -> Array:
     """(n, 6) wrenches about the world origin as wrenches about points (n, 3)."""
@@ -140,15 +195,39 @@ def about(wrench: Array, points: Array) -> Array:
     return np.concatenate([force, torque - np.cross(points, force)], axis=1)
 
 
-class Timer:
-    """Seconds by part of a step."""
+def joined(reports: Sequence[StepReport]) -> StepReport:
+    """The report of a step from those of its parts: means of forces, sums of what was exchanged,
+    and the state at the end."""
+    if len(reports) == 1:
+        return reports[0]
+    values = {name: [getattr(report, name) for report in reports] for name in FIELDS}
+    return StepReport(**{name: made.parts(values[name]) for name, made in FIELDS.items()})
 
-    def __init__(self) -> None:
-        self.seconds: dict[str, float] = {}
-        self._last = perf_counter()
 
-    def lap(self, part: str) -> None:
-        """Book the time since the last lap to `part`."""
-        now = perf_counter()
-        self.seconds[part] = self.seconds.get(part, 0.0) + now - self._last
-        self._last = now
+FIELDS: dict[str, Joined] = {
+    name: hint.__metadata__[0]
+    for name, hint in get_type_hints(StepReport, include_extras=True).items()
+}
+"""How each field of a step's report is joined."""
+
+_timing: ContextVar[tuple[dict[str, float], str] | None] = ContextVar("timing", default=None)
+
+
+@contextmanager
+def timed(part: str) -> Iterator[dict[str, float]]:
+    """Seconds by part of a step, complete at the end of the block.
+
+    Those of the block, or of the calls of a function that this decorates, count for `part`; those
+    of a timed block or function inside it for its own part alone.
+    """
+    around = _timing.get()
+    seconds = defaultdict[str, float](float) if around is None else around[0]
+    token, started = _timing.set((seconds, part)), perf_counter()
+    try:
+        yield seconds
+    finally:
+        _timing.reset(token)
+        spent = perf_counter() - started
+        seconds[part] += spent
+        if around is not None:
+            seconds[around[1]] -= spent

@@ -32,7 +32,7 @@ from flowborne.coupling.operators import (
     pressure_push,
     side_push,
 )
-from flowborne.coupling.report import Outcome, Timer
+from flowborne.coupling.report import Outcome, timed
 from flowborne.coupling.viscous_solve import diffuse
 from flowborne.coupling.world import Fluid, World
 from flowborne.fluid.grid import Array, Faces, Grid, faces_of
@@ -61,20 +61,45 @@ PROBES = 4
 
 
 @dataclass(frozen=True)
-class Projected:
-    """What the pressure solve gave.
+class Solved:
+    """The bodies' velocities at the end of a step, and what led to them.
 
-    velocity    Faces u+, m/s
-    pressure    (nx, ny, nz) p, Pa
-    impulse     (k,) J^T p^: wrenches about the world origin, then forces on vertices of flesh, N s
-                and N m s
-    sides       (3,) impulse of the sides on the fluid, N s
-    iterations  of the solve, all turns of a step together in the end
-    residual    true relative residual
-    divergence  largest |net outflow of a cell| / volume, 1/s
-    fastest     largest |u+| on an open face, m/s
+    driven       the bodies' system in its last form
+    v, actuator  (nv,) velocity and forces of the drives
+    outcome      DONE, or which solve missed its tolerance, or that contacts, limits or Coriolis
+                 forces did not settle
+    unsettled    (k,) dofs as in `StepReport`
     """
 
+    driven: Driven
+    v: Array
+    actuator: Array
+    outcome: Outcome
+    unsettled: Integers
+
+
+@dataclass(frozen=True)
+class SolvedFlow(Solved):
+    """The same with the fluid's. Impulses (k,) on bodies are wrenches about the world origin, then
+    forces on vertices of flesh, N s and N m s.
+
+    viscous_impulse  (k,)
+    added_mass       (k,) part of `impulse`, see `added_mass_impulse`; nan where the setup does not
+                     split forces
+    before_pressure  Faces, m/s
+    velocity         Faces u+, m/s
+    pressure         (nx, ny, nz) p, Pa
+    impulse          (k,) J^T p^
+    sides            (3,) impulse of the sides on the fluid, N s
+    iterations       of the pressure solve, all turns of a step together
+    residual         true relative residual
+    divergence       largest |net outflow of a cell| / volume, 1/s
+    fastest          largest |u+| on an open face, m/s
+    """
+
+    viscous_impulse: Array
+    added_mass: Array
+    before_pressure: Faces
     velocity: Faces
     pressure: Array
     impulse: Array
@@ -83,33 +108,6 @@ class Projected:
     residual: float
     divergence: float
     fastest: float
-
-
-@dataclass(frozen=True)
-class Solved:
-    """The world's velocities at the end of a step, and what led to them.
-
-    driven            the bodies' system in its last form
-    v, actuator       (nv,) velocity and forces of the drives
-    viscous_impulse   (k,) as in `Projected`
-    added_mass        (k,) part of the pressure's impulse, see `added_mass_impulse`; nan where the
-                      setup does not split forces
-    before_pressure   Faces, m/s; None without a fluid
-    projected         None without a fluid
-    outcome           DONE, or which solve missed its tolerance, or that contacts, limits or
-                      Coriolis forces did not settle
-    unsettled         (k,) dofs as in `StepReport`
-    """
-
-    driven: Driven
-    v: Array
-    actuator: Array
-    viscous_impulse: Array
-    added_mass: Array
-    before_pressure: Faces | None
-    projected: Projected | None
-    outcome: Outcome
-    unsettled: Integers
 
 
 def correct(driven: Driven, v: Array, actuator: Array, limit: Array) -> Driven | None:
@@ -135,8 +133,8 @@ def unsettled(driven: Driven, changed: Driven | None, v: Array) -> Integers:
     return np.flatnonzero(wrong)
 
 
-def solve_bodies(driven: Driven, torque_limit: Array, size: int) -> Solved:
-    """Bodies without a fluid; k is `size`."""
+def solve_bodies(driven: Driven, torque_limit: Array) -> Solved:
+    """Bodies without a fluid."""
     none, tried = np.zeros(driven.velocity.size), driven
     for _ in range(PASSES):
         actuator = driven.actuator(driven.velocity, none)
@@ -146,10 +144,10 @@ def solve_bodies(driven: Driven, torque_limit: Array, size: int) -> Solved:
         tried, driven = driven, changed
     left = unsettled(tried, changed, tried.velocity)
     outcome = Outcome.DONE if changed is None else Outcome.NOT_SETTLED
-    nothing = np.zeros(size)
-    return Solved(driven, driven.velocity, actuator, nothing, nothing, None, None, outcome, left)
+    return Solved(driven, driven.velocity, actuator, outcome, left)
 
 
+@timed("projection")
 def solve_together(
     world: World,
     velocity: Faces,
@@ -159,8 +157,7 @@ def solve_together(
     cut: Geometry,
     jets: tuple[Jet, ...],
     torque_limit: Array,
-    timer: Timer,
-) -> Solved:
+) -> SolvedFlow:
     """Viscosity, pressure and bodies at the end of the step (section 6, item 6).
 
     velocity  Faces u*, m/s, after advection and forces
@@ -183,9 +180,7 @@ def solve_together(
         tolerance = max(tolerance, TIGHTENING)
     rate = source_rate(fluid, world.time + dt, cut.open)
     add_rates(rate, jets)
-    timer.lap("projection")
     smooth, viscous, smoothed = diffuse(world, velocity, mass, gradient, cut, jets, pose, driven)
-    timer.lap("viscosity")
     term = LowRankTerm(cut.rows, mobility)
     net = net_outflow(smooth, cut, rate, fluid)
     carried = leak_proof(smooth, cut, boundary_velocity(pose, driven.velocity), fluid.grid)
@@ -202,7 +197,6 @@ def solve_together(
         v = driven.after(impulse)
         actuator = driven.actuator(v, impulse)
         changed = correct(driven, v, actuator, torque_limit)
-        timer.lap("projection")
         if changed is None and tolerance <= fluid.tolerance:
             break
         if changed is not None:
@@ -211,7 +205,6 @@ def solve_together(
                 smooth, viscous, smoothed = diffuse(
                     world, velocity, mass, gradient, cut, jets, pose, changed
                 )
-                timer.lap("viscosity")
                 net = net_outflow(smooth, cut, rate, fluid)
             tried, driven = driven, changed
         tolerance = max(fluid.tolerance, TIGHTENING * tolerance)
@@ -219,16 +212,6 @@ def solve_together(
     after = faces_of([u.copy() for u in smooth])
     gradient.subtract(after, solution.pressure, 1.0)
     moved = start + term.mobility.times(on_solids)
-    projected = Projected(
-        after,
-        solution.pressure / dt,
-        on_solids,
-        side_push(solution.pressure, cut.open, gradient),
-        iterations,
-        solution.residual,
-        largest_divergence(after, cut, moved, rate, fluid),
-        max(largest_open(after[axis], cut.open[axis]) for axis in fluid.grid.axes),
-    )
     left = unsettled(tried, changed, v)
     outcome = Outcome.DONE if changed is None else Outcome.NOT_SETTLED
     if not smoothed:
@@ -242,8 +225,24 @@ def solve_together(
         if yielding.size:
             plain = PressureSystem(weights, fluid.boundaries.periodic(), beyond=beyond)
         added = added_mass_impulse(plain, cut, change)
-    timer.lap("projection")
-    return Solved(driven, v, actuator, viscous, added, smooth, projected, outcome, left)
+    return SolvedFlow(
+        driven,
+        v,
+        actuator,
+        outcome,
+        left,
+        viscous_impulse=viscous,
+        added_mass=added,
+        before_pressure=smooth,
+        velocity=after,
+        pressure=solution.pressure / dt,
+        impulse=on_solids,
+        sides=side_push(solution.pressure, cut.open, gradient),
+        iterations=iterations,
+        residual=solution.residual,
+        divergence=largest_divergence(after, cut, moved, rate, fluid),
+        fastest=max(largest_open(after[axis], cut.open[axis]) for axis in fluid.grid.axes),
+    )
 
 
 def added_mass_impulse(matrix: PressureSystem, cut: Geometry, change: Array) -> Array:

@@ -26,6 +26,8 @@ Deviations from the paper, and their reasons:
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from flowborne.coupling.bodies_step import (
@@ -47,15 +49,9 @@ from flowborne.coupling.flow import (
 )
 from flowborne.coupling.half_pressure import explicit_half_pressure
 from flowborne.coupling.operators import generalised
-from flowborne.coupling.report import Outcome, StepReport, Timer
+from flowborne.coupling.report import Outcome, StepReport, joined, timed
 from flowborne.coupling.solve import solve_together
-from flowborne.coupling.step_report import (
-    blank,
-    joined,
-    known_push,
-    momentum_balance,
-    report_coupled,
-)
+from flowborne.coupling.step_report import known_forces, report_coupled, report_failed
 from flowborne.coupling.world import World
 from flowborne.fluid.control_volumes import face_masses
 from flowborne.solids.dynamics import kinematics
@@ -74,66 +70,55 @@ def step(world: World, dt: float, command: JointCommand | None = None) -> StepRe
     returns  the report; its outcome is not DONE when the numbers cannot be trusted, and the world
              cannot be stepped on
     """
-    came = np.zeros(3) if world.setup.trial else follow(world)
-    told = joint_command(world, dt, command)
-    parts = parts_of(world, position_velocity(world, told), dt)
-    if not world.setup.trial:
-        world.parts = parts = max(parts, world.parts)
-    command = JointCommand.none(world.setup.solid.nv) if command is None else command
-    reports: list[StepReport] = []
-    for left in range(parts, 0, -1):
-        reports.append(step_part(world, dt / parts, part_of(command, world, left)))
-        if reports[-1].outcome is not Outcome.DONE:
-            break
-    done = joined(reports)
-    done.momentum.crossed = done.momentum.crossed + came
-    return done
+    with timed("solids") as seconds:
+        came = np.zeros(3) if world.setup.trial else follow(world)
+        told = joint_command(world, dt, command)
+        parts = parts_of(world, position_velocity(world, told), dt)
+        if not world.setup.trial:
+            world.parts = parts = max(parts, world.parts)
+        command = JointCommand.none(world.setup.solid.nv) if command is None else command
+        reports: list[StepReport] = []
+        for left in range(parts, 0, -1):
+            reports.append(step_part(world, dt / parts, part_of(command, world, left)))
+            if reports[-1].outcome is not Outcome.DONE:
+                break
+        done = joined(reports)
+    crossed = done.momentum_crossed + came
+    return replace(done, momentum_crossed=crossed, seconds=dict(seconds))
 
 
 def step_part(world: World, dt: float, command: JointCommand) -> StepReport:
     """Advance `world` by a part of a step, in place, that no body crosses more than a cell in."""
-    timer = Timer()
-    done = blank(world, dt, timer)
     if not world.setup.trial:
         world.ahead = 0.5 * dt
-    command = joint_command(world, dt, command)
     take = step_bodies if world.setup.fluid is None else step_coupled
-    take(world, dt, command, done, timer)
-    return done
+    return take(world, dt, joint_command(world, dt, command))
 
 
-def step_coupled(
-    world: World, dt: float, command: JointCommand, done: StepReport, timer: Timer
-) -> None:
+@timed("advection")
+def step_coupled(world: World, dt: float, command: JointCommand) -> StepReport:
     """Bodies and fluid a step later, in place; the numbers are those above."""
-    (fluid, state), end = world.flow(), world.time + dt
+    (fluid, state), model, end = world.flow(), world.setup.solid, world.time + dt
     start = departure(world)
-    timer.lap("geometry")
     far = far_field(world, start, dt)
     half = explicit_half_pressure(world, start, dt)  # 1
-    timer.lap("advection")
-    move_bodies(world, command, dt)  # 2
-    pose = kinematics(world.setup.solid, world.solid.q)
-    timer.lap("solids")
+    with timed("solids"):
+        move_bodies(world, command, dt)  # 2
+        pose = kinematics(model, world.solid.q)
     cut = cut_by_bodies(world, pose)  # 3
-    timer.lap("geometry")
     transport = leak_proof_transport(world, start, cut, dt)  # 4
     advected, dyed = advect(world, start, half.velocity, transport)  # 5
     mass = face_masses(advected.volumes, fluid.density)
     driven_sides = far.drive(advected, mass, cut.open, fluid)
     velocity = apply_body_force_and_sides(driven_sides.velocity, cut.open, mass, fluid, end, dt)
-    timer.lap("advection")
     if not all(np.isfinite(u).all() for u in velocity):
-        done.outcome = Outcome.ADVECTION_NOT_FINITE
-        return
-    push = known_push(done, world, pose, half.impulse, advected.jets)
-    driven = equations(world, start.bodies, generalised(pose, push), command, dt)
-    timer.lap("solids")
+        return report_failed(model, dt, Outcome.ADVECTION_NOT_FINITE)
+    with timed("solids"):
+        push, known = known_forces(world, pose, half.impulse, advected.jets, dt)
+        driven = equations(world, start.bodies, generalised(pose, push), command, dt)
     jets, limit = jets_at(world, cut, end, pose), command.torque_limit
-    solved = solve_together(world, velocity, mass, driven, pose, cut, jets, limit, timer)  # 6
+    solved = solve_together(world, velocity, mass, driven, pose, cut, jets, limit)  # 6
     store_state(world, half, advected, dyed, solved, cut, pose)  # 7
     state.wake, state.sea = far.wake, far.velocity
-    done.momentum = momentum_balance(world, mass, half, driven_sides, solved)
-    done.dye_error = dyed.error
-    report_coupled(done, world, pose, half.impulse, solved)
-    timer.lap("advection")
+    known |= {"dye_budget_error": dyed.error}
+    return report_coupled(world, dt, pose, mass, half, driven_sides, solved, known)

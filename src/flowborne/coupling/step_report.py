@@ -1,8 +1,9 @@
-"""What a step reports about the bodies and the fluid's momentum, filled in as it becomes known."""
+"""The report of a step, made at its end from what was solved for."""
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -11,86 +12,107 @@ from flowborne.coupling.flow import AdvectionResult
 from flowborne.coupling.half_pressure import HalfPressure
 from flowborne.coupling.mouths import Jet, jet_wrench
 from flowborne.coupling.operators import buoyancy_wrench
-from flowborne.coupling.report import Momentum, Outcome, StepReport, Timer
-from flowborne.coupling.solve import Solved
+from flowborne.coupling.report import FIELDS, Outcome, StepReport
+from flowborne.coupling.solve import Solved, SolvedFlow
 from flowborne.coupling.stream import winds_on
 from flowborne.coupling.world import World
 from flowborne.fluid.control_volumes import fluid_momentum, momentum_change
 from flowborne.fluid.grid import Array, Faces
 from flowborne.solids.dynamics import Kinematics
 from flowborne.solids.flesh import Flesh
+from flowborne.solids.model import SolidModel
 from flowborne.solids.momentum import halfway_momentum
 
+WRENCHES = [name for name in FIELDS if name.endswith("_wrench")]
 
-def blank(world: World, dt: float, timer: Timer) -> StepReport:
-    """The report of a step of which nothing is known: forces are nan, or 0 without a fluid."""
-    model, force = world.setup.solid, 0.0 if world.setup.fluid is None else np.nan
-    wrench, drives = np.full((model.nbody, 6), force), np.full(model.nv, force)
+
+def fluid_forces(model: SolidModel, value: float) -> dict[str, Any]:
+    """What a report says of forces on bodies where all are `value`: 0, or nan if not known."""
+    wrench = np.full((model.nbody, 6), value)
+    return dict.fromkeys(WRENCHES, wrench) | {"centre": wrench[:, :3]}
+
+
+def report_failed(model: SolidModel, dt: float, outcome: Outcome) -> StepReport:
+    """Of a step that ended before its solve."""
+    drives = np.full(model.nv, np.nan)
+    return StepReport(dt, outcome, drives, drives, drives, **fluid_forces(model, np.nan))
+
+
+def report_bodies(world: World, dt: float, solved: Solved, known: dict[str, Any]) -> StepReport:
+    """Of a step without a fluid.
+
+    known  what the report says of winds; of all of the fluid, if there is one
+    """
+    before, model = solved.driven.system.v, world.setup.solid
+    velocity = 0.5 * (before + solved.v)
+    actuator = solved.actuator + world.told.force_on(model.nv)
     return StepReport(
-        dt=dt,
-        outcome=Outcome.DONE,
-        velocity=drives,
-        acceleration=drives,
-        actuator=drives,
-        pressure_wrench=wrench,
-        viscous_wrench=wrench,
-        buoyancy_wrench=wrench,
-        wind_wrench=wrench,
-        jet_wrench=wrench,
-        added_mass_wrench=wrench,
-        centre=wrench[:, :3],
-        seconds=timer.seconds,
+        dt,
+        solved.outcome if np.isfinite(solved.v).all() else Outcome.NOT_FINITE,
+        velocity,
+        (solved.v - before) / dt,
+        actuator,
+        work=dt * float(actuator @ velocity),
+        momentum_solid=halfway_momentum(model, world.solid, dt)[0],
+        contacts=solved.driven.system.contacts,
+        limited=solved.driven.limited.nonzero()[0],
+        unsettled=solved.unsettled,
+        **fluid_forces(model, 0.0) | known,
     )
 
 
-def known_push(
-    done: StepReport, world: World, pose: Kinematics, half: Array, jets: tuple[Jet, ...]
-) -> Array:
+def known_forces(
+    world: World, pose: Kinematics, half: Array, jets: tuple[Jet, ...], dt: float
+) -> tuple[Array, dict[str, Any]]:
     """(k,) force on the bodies that is known before the solve, N and N m: of winds, of jets, of the
-    hydrostatic pressure, and of half of the last pressure with the impulse `half` (k,)."""
+    hydrostatic pressure, and of half of the last pressure with the impulse `half` (k,); and what
+    the report says of it."""
     model, density = world.setup.solid, world.flow()[0].density
     buoyancy = buoyancy_wrench(pose.centroid, model.volume, model.gravity, density).ravel()
     if model.flesh is not None:
         surface = model.flesh.surface
         pressed = hydrostatic_push(pose.vertices, surface, model.gravity, density)
         buoyancy = np.append(buoyancy, pressed)
-    done.expelled = done.dt * sum(jet.rate for jet in jets)
-    done.wind_wrench = winds_on(world, pose)
-    done.jet_wrench = jet_wrench(jets, density, model.nbody)
-    done.buoyancy_wrench = on_bodies(pose, model.flesh, buoyancy)
-    push = buoyancy + half / done.dt
-    push[: 6 * model.nbody] += (done.wind_wrench + done.jet_wrench).ravel()
-    return push
-
-
-def report_bodies(done: StepReport, world: World, solved: Solved) -> None:
-    """What the solve gave to the bodies and their drives."""
-    before, model, told = solved.driven.system.v, world.setup.solid, world.setup.told
-    done.velocity, done.acceleration = 0.5 * (before + solved.v), (solved.v - before) / done.dt
-    done.actuator = solved.actuator + told.force_on(model.nv)
-    done.work = done.dt * float(done.actuator @ done.velocity)
-    done.momentum.solid = halfway_momentum(model, world.solid, done.dt)[0]
-    done.contacts, done.limited = solved.driven.system.contacts, solved.driven.limited.nonzero()[0]
-    done.outcome, done.unsettled = solved.outcome, solved.unsettled
-    if not np.isfinite(solved.v).all():
-        done.outcome = Outcome.NOT_FINITE
+    wind, jet = winds_on(world, pose), jet_wrench(jets, density, model.nbody)
+    push = buoyancy + half / dt
+    push[: 6 * model.nbody] += (wind + jet).ravel()
+    return push, {
+        "buoyancy_wrench": on_bodies(pose, model.flesh, buoyancy),
+        "wind_wrench": wind,
+        "jet_wrench": jet,
+        "expelled": dt * sum(jet.rate for jet in jets),
+    }
 
 
 def report_coupled(
-    done: StepReport, world: World, pose: Kinematics, half: Array, solved: Solved
-) -> None:
-    """`report_bodies`, the forces of the fluid on the bodies, and how well the solve did."""
-    report_bodies(done, world, solved)
-    projected, flesh, dt = solved.projected, world.setup.solid.flesh, done.dt
-    assert projected is not None
-    done.centre = pose.mass_centre
-    done.pressure_wrench = on_bodies(pose, flesh, (projected.impulse + half) / dt)
-    done.viscous_wrench = on_bodies(pose, flesh, solved.viscous_impulse / dt)
-    done.added_mass_wrench = on_bodies(pose, flesh, solved.added_mass / dt)
-    done.iterations, done.residual = projected.iterations, projected.residual
-    done.divergence, done.fastest = projected.divergence, projected.fastest
-    if not np.isfinite(projected.pressure).all():
-        done.outcome = Outcome.NOT_FINITE
+    world: World,
+    dt: float,
+    pose: Kinematics,
+    mass: Faces,
+    half: HalfPressure,
+    advected: AdvectionResult,
+    solved: SolvedFlow,
+    known: dict[str, Any],
+) -> StepReport:
+    """Of a step with a fluid: forces on the bodies, the budget of momentum, how well the solve did.
+
+    mass   Faces, of the fluid at the end of the step, kg
+    known  what the report says of forces known before the solve, and of dyes
+    """
+    flesh = world.setup.solid.flesh
+    known |= momentum_budget(world, mass, half, advected, solved) | {
+        "centre": pose.mass_centre,
+        "pressure_wrench": on_bodies(pose, flesh, (solved.impulse + half.impulse) / dt),
+        "viscous_wrench": on_bodies(pose, flesh, solved.viscous_impulse / dt),
+        "added_mass_wrench": on_bodies(pose, flesh, solved.added_mass / dt),
+        "solver_iterations": solved.iterations,
+        "residual": solved.residual,
+        "divergence": solved.divergence,
+        "fastest": solved.fastest,
+    }
+    done = report_bodies(world, dt, solved, known)
+    finite = np.isfinite(solved.pressure).all()
+    return done if finite else replace(done, outcome=Outcome.NOT_FINITE)
 
 
 def on_bodies(pose: Kinematics, flesh: Flesh | None, push: Array) -> Array:
@@ -103,73 +125,38 @@ def on_bodies(pose: Kinematics, flesh: Flesh | None, push: Array) -> Array:
     return push[:first].reshape(-1, 6) + flesh.carried.T @ wrench
 
 
-def momentum_balance(
-    world: World, mass: Faces, half: HalfPressure, advected: AdvectionResult, solved: Solved
-) -> Momentum:
-    """The fluid's budget of a step that ends with the masses `mass` of the faces."""
+def momentum_budget(
+    world: World, mass: Faces, half: HalfPressure, advected: AdvectionResult, solved: SolvedFlow
+) -> dict[str, Any]:
+    """What the report says of the fluid's momentum, with the masses `mass` of the faces at the end
+    of the step."""
     fluid, _ = world.flow()
-    projected, before = solved.projected, solved.before_pressure
-    assert projected is not None
-    assert before is not None
-    grid, boundaries = fluid.grid, fluid.boundaries
+    before, grid, boundaries = solved.before_pressure, fluid.grid, fluid.boundaries
     first = 6 * world.setup.solid.nbody
     pressed = fluid_momentum(before, mass, grid, boundaries)
-    taken, moved = momentum_change(before, projected.velocity, mass, grid, boundaries)
-    after = fluid_momentum(projected.velocity, mass, grid, boundaries)
-    pushes = linear(projected.impulse, first)
+    taken, moved = momentum_change(before, solved.velocity, mass, grid, boundaries)
+    after = fluid_momentum(solved.velocity, mass, grid, boundaries)
+    pushes = linear(solved.impulse, first)
     exchanged = pushes.sum(axis=0)
     scale = float(np.abs(pushes).sum()) + moved
-    missing = float(np.abs(exchanged + taken - projected.sides).max())
-    sides = projected.sides + half.sides
+    missing = float(np.abs(exchanged + taken - solved.sides).max())
+    sides = solved.sides + half.sides
     exchanged += linear(half.impulse, first).sum(axis=0)
     forces = pressed - fluid_momentum(advected.velocity, mass, grid, boundaries)
     given = advected.crossed + advected.expelled + advected.stopped + forces + sides - exchanged
     unknown = float(np.abs(after - half.start - given).max())
-    return Momentum(
-        fluid=after,
-        exchanged=exchanged,
-        exchange_error=missing / scale if scale > 0.0 else 0.0,
-        boundary=sides + advected.stopped,
-        crossed=advected.crossed,
-        jet=advected.expelled,
-        forces=forces,
-        budget_error=unknown / scale if scale > 0.0 else 0.0,
-    )
+    return {
+        "momentum_fluid": after,
+        "momentum_exchanged": exchanged,
+        "momentum_boundary": sides + advected.stopped,
+        "momentum_crossed": advected.crossed,
+        "momentum_jet": advected.expelled,
+        "momentum_forces": forces,
+        "momentum_exchange_error": missing / scale if scale > 0.0 else 0.0,
+        "momentum_budget_error": unknown / scale if scale > 0.0 else 0.0,
+    }
 
 
 def linear(push: Array, first: int) -> Array:
     """(n, 3) the forces in a push (k,), with the wrenches on bodies before index `first`."""
     return np.concatenate([push[:first].reshape(-1, 6)[:, :3], push[first:].reshape(-1, 3)])
-
-
-def joined(reports: list[StepReport]) -> StepReport:
-    """The report of a step from those of its parts: means of forces, sums of what was exchanged,
-    and the state at the end."""
-    last = reports[-1]
-    if len(reports) == 1:
-        return last
-
-    budget = [report.momentum for report in reports]
-    sums = ("exchanged", "advection", "boundary", "crossed", "jet", "forces")
-    momentum = replace(
-        last.momentum,
-        **{name: np.sum([getattr(m, name) for m in budget], axis=0) for name in sums},
-        exchange_error=max(m.exchange_error for m in budget),
-        budget_error=max(m.budget_error for m in budget),
-    )
-    means = [f.name for f in fields(StepReport) if f.name.endswith("_wrench")]
-    means += ["actuator", "centre"]
-    return replace(
-        last,
-        dt=sum(report.dt for report in reports),
-        **{n: np.mean([getattr(r, n) for r in reports], axis=0) for n in means},
-        iterations=sum(r.iterations for r in reports),
-        divergence=max(r.divergence for r in reports),
-        fastest=max(r.fastest for r in reports),
-        momentum=momentum,
-        work=sum(r.work for r in reports),
-        expelled=sum(r.expelled for r in reports),
-        dye_error=max(r.dye_error for r in reports),
-        seconds={k: sum(r.seconds.get(k, 0.0) for r in reports) for k in last.seconds},
-        limited=np.unique(np.concatenate([r.limited for r in reports])),
-    )

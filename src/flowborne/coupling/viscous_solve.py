@@ -27,6 +27,7 @@ from flowborne.coupling.flesh import skin_at
 from flowborne.coupling.fractions import Geometry
 from flowborne.coupling.mouths import Jet, skin_slip
 from flowborne.coupling.operators import boundary_velocity, generalised, pressure_push
+from flowborne.coupling.report import timed
 from flowborne.coupling.world import World
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.ghosts import edge
@@ -319,6 +320,7 @@ class ViscousSystem:
         return parts[0], parts[1], parts[2]
 
 
+@timed("viscosity")
 def diffuse(
     world: World,
     velocity: Faces,

@@ -62,7 +62,7 @@ class Fluid:
                     )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Setup:
     """The constant part of a world, shared by all its copies.
 
@@ -73,7 +73,7 @@ class Setup:
     mouths   patches of skin through which fluid is expelled; needs a fluid that is not one-way
     trial    whether steps are hypothetical, and may be longer than those of the world itself
     splits   whether steps report the added-mass part of the fluid's force, which costs a solve
-    told     what joints are told from outside
+    basis    a setup of the same bodies on the same grid, whose shapes are those of this one
     """
 
     solid: SolidModel
@@ -83,9 +83,9 @@ class Setup:
     mouths: tuple[Mouth, ...] = ()
     trial: bool = False
     splits: bool = False
-    told: Told = NOTHING_TOLD
+    basis: Setup | None = None
 
-    @cached_property
+    @property
     def hypothetical(self) -> Setup:
         """The same for hypothetical steps: their pressure is solved as far as a gradient needs."""
         fluid = self.fluid
@@ -93,17 +93,14 @@ class Setup:
             fluid = replace(fluid, tolerance=max(fluid.tolerance, TRIAL_TOLERANCE))
         return self.but(fluid=fluid, trial=True, splits=False)
 
-    @cached_property
+    @property
     def rehearsed(self) -> Setup:
         """The same for hypothetical steps that go on as those of the world itself do."""
         return self.hypothetical.but(trial=False)
 
     def but(self, **parts: Any) -> Setup:
         """The same with other `parts`, but the same bodies on the same grid: sampled once."""
-        other = replace(self, **parts)
-        if self.fluid is not None:
-            vars(other)["shapes"] = self.shapes
-        return other
+        return replace(self, basis=self.basis or self, **parts)
 
     def on(self, grid: Grid) -> Setup:
         """The same on a grid that has moved."""
@@ -117,6 +114,8 @@ class Setup:
     @cached_property
     def shapes(self) -> Shapes:
         """The bodies' geometries sampled on the fluid's grid: none if the fluid is one-way."""
+        if self.basis is not None:
+            return self.basis.shapes
         assert self.fluid is not None
         solid = SolidModel.empty() if self.fluid.one_way else self.solid
         return shapes(solid, self.fluid.grid)
@@ -133,6 +132,7 @@ class World:
     ahead   s by which v is ahead of the positions: half of the last part of a step of its own
     parts   most parts that a step of the world itself has been divided into, see `bodies_step`
     memory  the controller's own arrays, by name
+    told    what joints are told from outside in this frame: not part of the state
     cut     the positions (nq,) for which the grid was cut last, and that cut: made from the state,
             and not part of it
     volumes the cut that the last step ended with, and its control volumes; likewise
@@ -146,6 +146,7 @@ class World:
     ahead: float = 0.0
     parts: int = 1
     memory: dict[str, Array] = field(default_factory=dict)
+    told: Told = NOTHING_TOLD
     cut: tuple[Array, Geometry] | None = field(default=None, repr=False, compare=False)
     volumes: tuple[Geometry, ControlVolumes] | None = field(default=None, repr=False, compare=False)
 

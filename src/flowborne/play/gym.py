@@ -24,9 +24,9 @@ from flowborne.base.extras import optional
 from flowborne.control.commands import Command, Position, Torque, Velocity, servo_of, torque_limit
 from flowborne.control.measurement import Measurement
 from flowborne.kernels.arrays import Array
-from flowborne.runs.frame_report import FrameReport
 from flowborne.scenes.load import load_scene
 from flowborne.scenes.schema import Scene
+from flowborne.sim.frame import FrameReport
 from flowborne.sim.simulation import BlowUpError, Simulation
 from flowborne.solids.model import SLIDE
 
@@ -182,29 +182,28 @@ class SceneEnv(gymnasium.Env):  # type: ignore[name-defined]
             first += count
         return commands
 
-    def _observed(self) -> list[str]:
-        model, found = self.simulation.setup.solid, list[str]()
+    def _observed(self) -> dict[str, float]:
+        """The numbers of an observation by their names."""
+        simulation, model = self.simulation, self.simulation.setup.solid
+        found: dict[str, float] = {}
         for joint in self._joints:
-            scalar, dofs = model.positions_of(joint).size == 1, model.dofs_of(joint)
-            unit = "m" if model.mj.jnt_type[model.joint(joint)] == SLIDE else "rad"
-            found += [f"position_{joint}_{unit}"] if scalar else []
+            state, dofs = simulation.joint(joint), model.dofs_of(joint)
+            if state.position.size == 1:
+                unit = "m" if model.mj.jnt_type[model.joint(joint)] == SLIDE else "rad"
+                found[f"position_{joint}_{unit}"] = state.position[0]
             for name in ("velocity", "drive"):
-                found += [f"{name}_{model.dof_names[dof]}" for dof in dofs]
-        found += [f"velocity_{axis}_m/s" for axis in "xyz"]
-        return found + [f"turn_{axis}_rad/s" for axis in "xyz"]
+                names = [f"{name}_{model.dof_names[dof]}" for dof in dofs]
+                found |= zip(names, getattr(state, name), strict=True)
+        root = simulation.body(model.body_names[int(model.moving.argmax())])
+        velocity, turn = root.velocity @ root.rotation, root.angular_velocity @ root.rotation
+        found |= {f"velocity_{axis}_m/s": v for axis, v in zip("xyz", velocity, strict=True)}
+        found |= {f"turn_{axis}_rad/s": v for axis, v in zip("xyz", turn, strict=True)}
+        return found
 
     def _observation(self) -> Array:
-        simulation = self.simulation
         if self._own_observe is not None:
-            return np.asarray(self._own_observe(simulation), np.float32)
-        model, found = simulation.setup.solid, list[Array]()
-        for joint in self._joints:
-            state = simulation.joint(joint)
-            found += [state.position] if state.position.size == 1 else []
-            found += [state.velocity, state.drive]
-        root = simulation.body(model.body_names[int(model.moving.argmax())])
-        found += [root.velocity @ root.rotation, root.angular_velocity @ root.rotation]
-        return np.nan_to_num(np.concatenate(found)).astype(np.float32)
+            return np.asarray(self._own_observe(self.simulation), np.float32)
+        return np.nan_to_num([*self._observed().values()]).astype(np.float32)
 
     def _minus_objectives(self, simulation: Simulation, report: FrameReport) -> float:
         controller = simulation.controller

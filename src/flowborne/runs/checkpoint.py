@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from flowborne.base.atomic import write_atomically
 from flowborne.base.given import read_arrays
-from flowborne.coupling.named import Sensed
 from flowborne.coupling.world import Setup, World
 from flowborne.fluid.state import under
+from flowborne.solids.sensed import Sensed
 
 SENSED = "sensed/"
 """Beginning of the names of arrays that say what bodies and joints felt."""
@@ -27,7 +27,7 @@ def save_checkpoint(path: Path, world: World, frame: int, sensed: Sensed | None 
     """
     arrays = world.arrays()
     if sensed is not None:
-        arrays |= {f"{SENSED}{name}": np.asarray(value) for name, value in vars(sensed).items()}
+        arrays |= {f"{SENSED}{name}": values for name, values in sensed.arrays().items()}
     write_atomically(path, lambda file: np.savez(file, frame=np.int64(frame), **arrays))  # type: ignore[arg-type]
 
 
@@ -45,13 +45,13 @@ def load_checkpoint(
         if frame.dtype != np.int64 or frame.shape != () or frame < 0:
             raise ValueError("its 'frame' is no number of frames")
         _check_arrays(arrays, setup, memory or {})
-        world = World.from_arrays(setup, arrays)
+        world, felt = World.from_arrays(setup, arrays), under(SENSED, arrays)
+        kept = Sensed.from_arrays(setup.solid, world.solid.q, felt) if felt else None
     except KeyError as error:
         raise ValueError(f"{path} is not a checkpoint of this scene (it lacks {error})") from error
     except (OSError, TypeError, ValueError) as error:
         raise ValueError(f"{path} is not a checkpoint of this scene ({error})") from error
-    felt = under(SENSED, arrays)
-    return world, int(frame), Sensed.from_arrays(felt) if felt else None
+    return world, int(frame), kept
 
 
 def _check_arrays(

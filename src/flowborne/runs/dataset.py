@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 from xarray.backends import BackendArray
 from xarray.core import indexing
 
-from flowborne.fluid.grid import Grid
-from flowborne.runs.history import HistoryArray
-from flowborne.runs.states import StateArray
+from flowborne.fluid.grid import Array, Grid
+from flowborne.runs.states import Quantity, StateArray
 
 
 class LazyStates(BackendArray):
@@ -43,15 +42,15 @@ def state_variable(array: StateArray) -> xarray.Variable:
 
 
 def history_variable(
-    array: HistoryArray, rows: NDArray[np.int64], frames: Sequence[int]
+    quantity: Quantity, known: Array, rows: NDArray[np.int64], frames: Sequence[int]
 ) -> xarray.Variable:
     """A quantity of the history at the times of the states, nan for states without a row."""
-    values = np.full((len(frames), *array.values.shape[1:]), np.nan)
+    values = np.full((len(frames), *known.shape[1:]), np.nan)
     _, here, there = np.intersect1d(np.array(frames), rows, return_indices=True)
-    values[here] = array.values[there]
-    about = {"units": array.unit, "long_name": array.meaning}
+    values[here] = known[there]
+    about = {"units": quantity.unit, "long_name": quantity.meaning}
     return xarray.Variable(
-        ("time", *array.dimensions), values, {key: text for key, text in about.items() if text}
+        ("time", *quantity.dimensions), values, {key: text for key, text in about.items() if text}
     )
 
 

@@ -15,6 +15,7 @@ import numpy as np
 from flowborne.base.atomic import write_text
 from flowborne.base.given import MOST_BYTES, check_file
 from flowborne.fluid.grid import Array
+from flowborne.runs.states import Quantity
 
 UNITS = {
     "s": "s",
@@ -32,21 +33,55 @@ UNITS = {
 }
 """Suffix of a column name after its last underscore -> unit."""
 
+
+class Measured(NamedTuple):
+    """A quantity of bodies or joints in the history.
+
+    word     in the names of its columns
+    unit     suffix of these names
+    meaning  in a few words, "" when the name says it
+    """
+
+    word: str
+    unit: str
+    meaning: str = ""
+
+
 OF_JOINTS = {
-    "angle": "angle of a hinge",
-    "position": "position of a slide",
-    "target_rad": "angle where the drive of a hinge is going",
-    "target_m": "position where the drive of a slide is going",
-    "torque": "torque of a joint's drive, mean over the frame",
-    "force": "force of a joint's drive, mean over the frame",
-    "power": "power of a joint's drive, mean over the frame",
+    "angle": Measured("angle", "rad", "angle of a hinge"),
+    "position": Measured("position", "m", "position of a slide"),
+    "target_angle": Measured("target", "rad", "angle where the drive of a hinge is going"),
+    "target_position": Measured("target", "m", "position where the drive of a slide is going"),
+    "torque": Measured("torque", "Nm", "torque of a joint's drive, mean over the frame"),
+    "force": Measured("force", "N", "force of a joint's drive, mean over the frame"),
+    "power": Measured("power", "W", "power of a joint's drive, mean over the frame"),
 }
-"""Quantity of a joint, with the unit if it can have several -> meaning."""
+"""Quantities of a joint."""
 
-TARGETS = {"target_rad": "target_angle", "target_m": "target_position"}
+OF_BODIES = {
+    "centre": Measured("centre", "m"),
+    "velocity": Measured("velocity", "m/s"),
+    "angular_velocity": Measured("rotation", "rad/s"),
+    "force": Measured("force", "N"),
+    "torque": Measured("torque", "Nm"),
+    "added_mass_force": Measured("added_mass_force", "N"),
+    "added_mass_torque": Measured("added_mass_torque", "Nm"),
+}
+"""Quantities (3,) of a body by their names in `BodyState`."""
 
-POSE = ("x", "y", "z", "qw", "qx", "qy", "qz")
-"""Columns of the pose of a body, which is also in the states."""
+POSE = ("x_m", "y_m", "z_m", "qw", "qx", "qy", "qz")
+"""Columns of the pose of a body, which is also in the states, after its name."""
+
+
+def joint_column(quantity: str, joint: str, axis: str = "") -> str:
+    """Name of the column of one of OF_JOINTS, with an axis where a joint has several."""
+    word, unit, _ = OF_JOINTS[quantity]
+    return "_".join([word, joint, *axis, unit])
+
+
+def body_columns(body: str) -> list[str]:
+    """Names of the columns of all of OF_BODIES."""
+    return [f"{body}_{word}_{a}_{unit}" for word, unit, _ in OF_BODIES.values() for a in "xyz"]
 
 
 class History:
@@ -203,31 +238,6 @@ def _text(value: float) -> str:
     return str(value) if isinstance(value, int) else repr(float(value))
 
 
-class HistoryArray(NamedTuple):
-    """A quantity of the history, for all bodies or joints that have it.
-
-    dimensions  of one frame: (), ("joint",), ("body", "axis"), ("joint", "axis") or ("axis",)
-    values      (frames, ...), nan for a body or joint without such a column
-    unit        "1" without one, "" when it depends on an objective
-    meaning     in a few words, "" when the name says it
-    """
-
-    dimensions: tuple[str, ...]
-    values: Array
-    unit: str
-    meaning: str
-
-
-class _Column(NamedTuple):
-    """The array of a column, and its joint, body and axis (0, 1, 2), if any."""
-
-    name: str
-    joint: str | None = None
-    body: str | None = None
-    axis: int | None = None
-    meaning: str = ""
-
-
 def unit_of(column: str) -> str:
     """Unit of a column of the history; "1" without one, "" when it depends on an objective."""
     if column.startswith(("objective", "measured_")):
@@ -241,8 +251,9 @@ def unit_of(column: str) -> str:
 
 def history_arrays(
     history: Mapping[str, Array], bodies: tuple[str, ...], joints: tuple[str, ...]
-) -> dict[str, HistoryArray]:
-    """Name -> quantity of a history, without its frame, its time and the poses of bodies.
+) -> dict[str, tuple[Quantity, Array]]:
+    """Name -> quantity of a history and its values (frames, ...), nan for a body or joint without
+    such a column; without the frame, the time and the poses of bodies.
 
     Quantities of joints are called `torque`, `power` and so on, or `torque_xyz` with three
     components; those of bodies `body_force` and so on. Others keep their column name without the
@@ -252,51 +263,47 @@ def history_arrays(
     bodies   names in the order of the dimension `body`
     joints   names in the order of the dimension `joint`
     """
-    found: dict[str, HistoryArray] = {}
-    lengths = {"body": len(bodies), "joint": len(joints), "axis": 3}
+    found: dict[str, tuple[Quantity, Array]] = {}
+    entries = {"joint": joints, "body": bodies, "axis": tuple("xyz")}
     for column, values in history.items():
-        at = _owner(column, bodies, joints)
-        if at is None:
+        place = _place(column, bodies, joints)
+        if place is None:
             continue
-        given = {"joint": at.joint, "body": at.body, "axis": at.axis}
-        dimensions = tuple(key for key, owner in given.items() if owner is not None)
-        if at.name not in found:
-            empty = np.full((len(values), *(lengths[key] for key in dimensions)), np.nan)
-            found[at.name] = HistoryArray(dimensions, empty, unit_of(column), at.meaning)
-        index = [] if at.joint is None else [joints.index(at.joint)]
-        index += [] if at.body is None else [bodies.index(at.body)]
-        index += [] if at.axis is None else [at.axis]
-        np.moveaxis(found[at.name].values, 0, -1)[tuple(index)] = values
+        name, meaning, at = place
+        if name not in found:
+            empty = np.full((len(values), *(len(entries[key]) for key in at)), np.nan)
+            found[name] = Quantity(tuple(at), unit_of(column), meaning), empty
+        index = tuple(entries[key].index(entry) for key, entry in at.items())
+        np.moveaxis(found[name][1], 0, -1)[index] = values
     return found
 
 
-def _owner(column: str, bodies: Collection[str], joints: Collection[str]) -> _Column | None:
-    """The array of a column; None for columns that are skipped."""
-    stem, _, unit = column.rpartition("_")
-    stem = stem if unit in UNITS else column
+def _place(
+    column: str, bodies: Collection[str], joints: Collection[str]
+) -> tuple[str, str, dict[str, str]] | None:
+    """Name and meaning of the array of a column, and its joint, body and axis, if any; None for
+    columns that are skipped."""
     if column in ("frame", "time_s"):
         return None
-    quantity, _, name = stem.partition("_")
-    quantity = f"target_{unit}" if quantity == "target" else quantity
-    whole, _, letter = stem.rpartition("_")
-    axis = "xyz".index(letter) if letter in tuple("xyz") else None
-    if quantity in OF_JOINTS:
-        called, meaning = TARGETS.get(quantity, quantity), OF_JOINTS[quantity]
-        if name in joints:
-            return _Column(called, joint=name, meaning=meaning)
-        name = name.rpartition("_")[0]
-        if axis is not None and name in joints:
-            return _Column(f"{called}_xyz", joint=name, axis=axis, meaning=meaning)
-    owners = [body for body in bodies if stem.startswith(f"{body}_") and quantity != "momentum"]
-    if owners:
+    stem, _, unit = column.rpartition("_")
+    stem = stem if unit in UNITS else column
+    whole, _, axis = stem.rpartition("_")
+    of_axis = {"axis": axis} if axis in tuple("xyz") else {}
+    for quantity, measured in OF_JOINTS.items():
+        if unit == measured.unit and stem.startswith(f"{measured.word}_"):
+            name = stem.removeprefix(f"{measured.word}_")
+            if name in joints:
+                return quantity, measured.meaning, {"joint": name}
+            name = name.rpartition("_")[0]
+            if of_axis and name in joints:
+                return f"{quantity}_xyz", measured.meaning, {"joint": name, **of_axis}
+    owners = [body for body in bodies if stem.startswith(f"{body}_")]
+    if owners and not column.startswith("momentum_"):
         body = max(owners, key=len)
-        rest = stem.removeprefix(f"{body}_")
-        if rest in POSE:
+        if column.removeprefix(f"{body}_") in POSE:
             return None
-        if axis is not None:
-            of_body = rest.rpartition("_")[0]
-            of_body = "angular_velocity" if of_body == "rotation" else of_body
-            return _Column(f"body_{of_body}", body=body, axis=axis)
-    if axis is not None:
-        return _Column(whole, axis=axis)
-    return _Column(stem)
+        if of_axis:
+            word = whole.removeprefix(f"{body}_")
+            known = {measured.word: quantity for quantity, measured in OF_BODIES.items()}
+            return f"body_{known.get(word, word)}", "", {"body": body, **of_axis}
+    return (whole if of_axis else stem), "", of_axis

@@ -150,7 +150,7 @@ class OpenRun:
 
         rows = self.history["frame"].astype(np.int64)
         history = history_arrays(self.history, self.bodies, self.joints)
-        variables = {n: history_variable(array, rows, self.frames) for n, array in history.items()}
+        variables = {n: history_variable(*array, rows, self.frames) for n, array in history.items()}
         variables |= {n: state_variable(array) for n, array in self.arrays.items() if n != "time"}
         coordinates: dict[str, Any] = {
             "time": ("time", self.times, {"units": "s"}),

@@ -27,21 +27,8 @@ BYTES_PER_MEMBER = 300
 class Recorder:
     """Writes states/NNNNNN.npz of a run.
 
-    Each file contains, in single precision except for the first two,
-
-      time                                       s
-      grid_origin (3,)                           m, lower corner of the grid, which may move
-      q (nq,), v (nv,)                           generalised coordinates
-      geom_position (ng, 3), geom_rotation (ng, 3, 3), body_position (nb, 3), body_rotation
-      fluid_force (nb, 3)                        N, force of fluid and winds on each body: mean over
-                                                 the frame, without the added-mass part
-      fluid_centre (nb, 3)                       m, its point in pictures: the centroid of the body
-                                                 and the flesh that it carries
-      flesh_vertices (k, 3)                      m, the vertices on the skin of flesh
-      velocity_x, velocity_y, velocity_z         m/s on the faces (no z in a slab)
-      pressure                                   Pa in the cells
-      scalar_<name>                              in the cells
-      open                                       part of each cell outside all bodies
+    Each file contains the arrays of `states.QUANTITIES` and the dyes, in single precision except
+    for time and grid_origin: those of the fluid where there is one, no velocity_z in a slab.
 
     Files are written atomically. `sync` flushes all of them to the disc together: one by one, this
     would take longer than writing them.
@@ -69,17 +56,8 @@ class Recorder:
 
     def bytes_per_frame(self, world: World) -> int:
         """Approximate size of a state file."""
-        solid = world.setup.solid
-        numbers, members = 18 * solid.nbody + 12 * solid.ngeom + solid.nq + solid.nv, 9
-        if solid.flesh is not None:
-            numbers += 3 * len(on_skin(solid.flesh))
-            members += 1
-        if world.fluid is not None and world.setup.fluid is not None:
-            moving = [world.fluid.velocity[axis] for axis in world.setup.fluid.grid.axes]
-            kept = [*moving, *world.fluid.scalars.values()]
-            numbers += sum(values.size for values in kept) + 2 * world.fluid.pressure.size
-            members += len(kept) + 2
-        return 4 * numbers + BYTES_PER_MEMBER * members
+        arrays = self.arrays(world, None).values()
+        return sum(values.nbytes + BYTES_PER_MEMBER for values in arrays)
 
     def arrays(self, world: World, force: Array | None) -> dict[str, NDArray[Any]]:
         """The arrays of a state file for `world`."""

@@ -25,11 +25,12 @@ Arrays = Mapping[str, NDArray[np.floating]]
 
 
 class Quantity(NamedTuple):
-    """Meaning of an array of the states.
+    """Meaning of an array of the states or of the history.
 
-    dimensions  names of its axes in one state
-    unit        "1" without one; in a slab forces are per metre of depth
-    meaning     in a few words
+    dimensions  names of its axes in one state or frame
+    unit        "1" without one, "" when it depends on an objective; in a slab forces are per metre
+                of depth
+    meaning     in a few words, "" when the name says it
     """
 
     dimensions: tuple[str, ...]

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -64,18 +65,13 @@ class Seen:
         return said
 
 
+@lru_cache(maxsize=1)
 def seen_bodies(setup: Setup) -> list[Seen]:
     """Every body and flesh that the fluid sees, of each the thinnest part and the longest tips.
 
-    None without a fluid, or with a one-way one. Found once for each setup: warnings, the lines of
+    None without a fluid, or with a one-way one. Kept for the last setup: warnings, the lines of
     `check` and the summary ask for them.
     """
-    if "seen" not in vars(setup):
-        vars(setup)["seen"] = _seen_by(setup)
-    return list(vars(setup)["seen"])
-
-
-def _seen_by(setup: Setup) -> list[Seen]:
     if setup.fluid is None or setup.fluid.one_way:
         return []
     grid = setup.fluid.grid

@@ -5,74 +5,32 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from flowborne.base.errors import SceneError
 from flowborne.control.objectives import name_of
-from flowborne.coupling.named import Named
-from flowborne.coupling.world import Setup, World
+from flowborne.coupling.report import FIELDS, StepReport
+from flowborne.coupling.world import Setup
 from flowborne.kernels.arrays import Array, Integers, Mask
-from flowborne.runs.frame_report import FrameReport
-from flowborne.solids.dynamics import Kinematics, kinematics
+from flowborne.runs.history import OF_BODIES, POSE, body_columns, joint_column
+from flowborne.sim.frame import FrameReport, Snapshot
 from flowborne.solids.geoms import quaternion_of
 from flowborne.solids.model import HINGE, SLIDE, SolidModel
 
 if TYPE_CHECKING:
     from flowborne.control.controller import Controller
 
-OF_BODIES = {
-    "centre": "m",
-    "velocity": "m/s",
-    "rotation": "rad/s",
-    "force": "N",
-    "torque": "Nm",
-    "added_mass_force": "N",
-    "added_mass_torque": "Nm",
-}
-"""Quantity of a body -> its unit; a torque is about the centre of mass, an added-mass one is a part
-of it."""
+POSITION = {HINGE: "angle", SLIDE: "position"}
+"""Kind of joint -> what its position is called."""
 
-POSITION = {HINGE: ("angle", "rad"), SLIDE: ("position", "m")}
-"""Kind of joint -> what its position is called, and its unit."""
-
-IMPULSES = ("exchanged", "advection", "boundary", "crossed", "forces")
-"""Parts of the budget that are impulses of a whole frame."""
+OF_STEPS = {name: made for name, made in FIELDS.items() if made.frame is not None}
+"""Columns made of the reports of steps."""
 
 LISTED = 3
 """Most columns that a message names."""
-
-
-@dataclass(frozen=True)
-class Moment:
-    """The end of a frame.
-
-    report  of the frame; None before the first
-    """
-
-    world: World
-    frame: int
-    report: FrameReport | None
-
-    @property
-    def done(self) -> FrameReport:
-        """The report, where there is one."""
-        assert self.report is not None
-        return self.report
-
-    @cached_property
-    def pose(self) -> Kinematics:
-        return kinematics(self.world.setup.solid, self.world.solid.q)
-
-    @cached_property
-    def named(self) -> Named:
-        return Named.after(self.world, self.report)
-
-    @cached_property
-    def drives(self) -> tuple[Array, Array]:
-        return drive_means(self.done)
 
 
 @dataclass(frozen=True)
@@ -80,12 +38,12 @@ class Quantity:
     """Columns that are computed together.
 
     names    in the order in which they are written
-    values   their numbers at a moment, in this order
-    of_step  whether only a step can tell them: before the first frame they are nan
+    values   their numbers, in this order, from a FrameReport
+    of_step  False where they are known without a frame: their numbers are from a Snapshot
     """
 
     names: Sequence[str]
-    values: Callable[[Moment], Iterable[float]]
+    values: Callable[[Any], Iterable[float]]
     of_step: bool = True
 
 
@@ -112,21 +70,14 @@ class Columns:
       flesh_least_detF, flesh_inside_out        least volume of an element over that at rest, number
                                                 of elements inside out, in scenes with flesh
       <body>_x_m … _z_m, <body>_qw … _qz        pose of every body
-      <body>_centre_x_m … _torque_z_Nm          of bodies named in the scene's output; see OF_BODIES
+      <body>_centre_x_m … _torque_z_Nm          of bodies named in the scene's output: OF_BODIES. A
+                                                torque is about the centre of mass, an added-mass
+                                                one is a part of it
       window_x_m … _z_m                         lower corner of a domain that follows bodies, along
                                                 the axes along which it moves
-      momentum_{solid,fluid}_{x,y,z}_Ns         after the frame
-      momentum_{exchanged,advection,…}_…_Ns     given to the bodies by pressure; made in advection
-                                                or lost (0 but in the paper's scheme); given to the
-                                                fluid by the sides' pressure (boundary), by what
-                                                flows through them (crossed), and by forces and
-                                                friction (forces)
-      momentum_jet_…_Ns, expelled_m3            brought into the fluid by mouths (m^2 in a slab), in
-                                                scenes that have some
-      momentum_{exchange,budget}_error          relative: of the pressure solve; of all of these
-      divergence_1/s, solver_iterations, residual, contacts
-      fastest_m/s                               largest speed of the fluid across an open part of a
-                                                face in any step of the frame
+      momentum_solid_x_Ns … fastest_m/s         see `StepReport`: momenta after the frame, impulses
+                                                and volumes of the whole frame, the worst of its
+                                                steps of all else
 
     names       in the order in which they are written
     controlled  column of the position of each controlled joint -> its place among their dofs
@@ -145,7 +96,7 @@ class Columns:
         self._controller = controller
         dofs = np.zeros(0, np.int64) if controller is None else controller.dofs
         self.controlled = controlled_positions(setup.solid, dofs)
-        self._quantities = (
+        quantities = (
             Quantity(("frame", "time_s"), lambda now: (now.frame, now.world.time), False),
             *of_joints(setup, dofs, joints, told),
             *of_objective(controller),
@@ -153,6 +104,7 @@ class Columns:
             *of_bodies(setup.solid, bodies),
             *of_fluid(setup),
         )
+        self._quantities = [quantity for quantity in quantities if quantity.names]
         self.names = tuple(name for quantity in self._quantities for name in quantity.names)
         twice = [name for name, count in Counter(self.names).items() if count > 1]
         if twice:
@@ -162,14 +114,15 @@ class Columns:
                 "model."
             )
 
-    def values(self, world: World, frame: int, report: FrameReport | None) -> dict[str, float]:
+    def values(self, now: Snapshot) -> dict[str, float]:
         """column -> number, in the order of `names`; without a report nan for what needs a step."""
-        now, found = Moment(world, frame, report), dict[str, float]()
+        found: dict[str, float] = {}
         for quantity in self._quantities:
-            if quantity.of_step and report is None:
+            source = now.report if quantity.of_step else now
+            if source is None:
                 found |= dict.fromkeys(quantity.names, np.nan)
             else:
-                found |= zip(quantity.names, quantity.values(now), strict=True)
+                found |= zip(quantity.names, quantity.values(source), strict=True)
         return found
 
     def lost(self, values: Mapping[str, float]) -> str:
@@ -188,13 +141,6 @@ class Columns:
             return {}
         steps = controller.greatest_strength() * controller.every * frame_time
         return {column: float(steps[n]) for column, n in self.controlled.items()}
-
-
-def drive_means(report: FrameReport) -> tuple[Array, Array]:
-    """(nv,) generalised force (N or N m) and power (W) of the drives, means over a frame."""
-    return report.mean(lambda step: step.actuator), report.mean(
-        lambda step: step.actuator * step.velocity
-    )
 
 
 def of_joints(
@@ -224,47 +170,49 @@ def of_joints(
     power: dict[str, Integers] = {}
     places = controlled_positions(model, controlled)
     for name in _joints(model):
-        dofs = model.dofs_of(name)
+        dofs, kind = model.dofs_of(name), _kind(model, name)
         named = driven[dofs].any() if isinstance(chosen, bool) else name in chosen
         named = bool(chosen and named)
-        if (position := _position(model, name)) is not None:
-            column = f"target_{name}_{position.rpartition('_')[2]}"
+        if kind in POSITION:
+            position = joint_column(POSITION[kind], name)
+            target = joint_column(f"target_{POSITION[kind]}", name)
             positions[position] = int(model.positions_of(name)[0])
             if position in places:
-                decided[column] = places[position]
+                decided[target] = places[position]
             elif named and prescribed[dofs[0]]:
-                followed[column] = positions[position]
+                followed[target] = positions[position]
         if named:
             force += _components(model, name)
-            power[f"power_{name}_W"] = dofs
+            power[joint_column("power", name)] = dofs
 
-    def target(now: Moment) -> Array:
+    def targets(now: Snapshot) -> list[float]:
         q = now.world.solid.q.copy()
         for motion in motions:
             q[model.indices_of(motion.dofs)] = motion.position(now.world.time)
-        return q
+        return _at(q, followed)
+
+    def forces(frame: FrameReport) -> list[float]:
+        mean = frame.mean(lambda step: step.actuator)
+        return [float(mean[dof]) for _, dof in force]
+
+    def powers(frame: FrameReport) -> list[float]:
+        mean = frame.power()
+        return [float(mean[dofs].sum()) for dofs in power.values()]
 
     yield Quantity([*positions], lambda now: _at(now.world.solid.q, positions), False)
-    yield Quantity([*decided], lambda now: _at(now.done.targets, decided))
-    if followed:
-        yield Quantity([*followed], lambda now: _at(target(now), followed), False)
-    if power:
-        yield Quantity(
-            [column for column, _ in force],
-            lambda now: [float(now.drives[0][dof]) for _, dof in force],
-        )
-        yield Quantity(
-            [*power], lambda now: [float(now.drives[1][dofs].sum()) for dofs in power.values()]
-        )
+    yield Quantity([*decided], lambda frame: _at(frame.targets, decided))
+    yield Quantity([*followed], targets, False)
+    yield Quantity([column for column, _ in force], forces)
+    yield Quantity([*power], powers)
 
 
 def of_objective(controller: Controller | None) -> Iterator[Quantity]:
     """The objective, and each of its terms once."""
     found = () if controller is None else controller.objective.terms
     terms = list(dict.fromkeys(name_of(term.objective) for term in found))
-    yield Quantity(["objective"], lambda now: [now.done.objective])
+    yield Quantity(["objective"], lambda frame: [frame.objective])
     yield Quantity(
-        [f"measured_{term}" for term in terms], lambda now: [now.done.terms[term] for term in terms]
+        [f"measured_{term}" for term in terms], lambda frame: [frame.terms[term] for term in terms]
     )
 
 
@@ -272,19 +220,17 @@ def of_forces(stream: tuple[float, ...] | None, controlled: Integers) -> Iterato
     """Drag and lift, effort and work."""
     along, across = axes_of(stream)
 
-    def forces(now: Moment) -> list[float]:
-        added = now.done.central_added_mass()[1:, :3].sum(axis=0)
-        both = now.done.drag()[1:].sum(axis=0), added
+    def forces(frame: FrameReport) -> list[float]:
+        added = frame.mean(StepReport.central_added_mass)[1:, :3].sum(axis=0)
+        both = frame.drag()[1:].sum(axis=0), added
         return [float(force @ axis) for force in both for axis in (along, across)]
 
-    def effort(now: Moment) -> float:
-        last = now.done.step
-        return float(np.linalg.norm(last.actuator[controlled]) * last.dt)
+    def effort(frame: FrameReport) -> list[float]:
+        return [float(np.linalg.norm(frame.step.actuator[controlled]) * frame.step.dt)]
 
     yield Quantity(["drag_N", "lift_N", "added_mass_drag_N", "added_mass_lift_N"], forces)
-    yield Quantity(
-        ["effort", "work_J"], lambda now: [effort(now), sum(s.work for s in now.done.steps)]
-    )
+    yield Quantity(["effort"], effort)
+    yield of_steps("work")
 
 
 def of_bodies(model: SolidModel, named: tuple[str, ...]) -> Iterator[Quantity]:
@@ -301,82 +247,61 @@ def of_bodies(model: SolidModel, named: tuple[str, ...]) -> Iterator[Quantity]:
             False,
         )
 
-    def poses(now: Moment) -> Iterator[float]:
-        for place, rotation in zip(now.pose.body_position, now.pose.body_rotation, strict=True):
+    def poses(now: Snapshot) -> Iterator[float]:
+        pose = now.sensed.pose
+        for place, rotation in zip(pose.body_position[1:], pose.body_rotation[1:], strict=True):
             yield from map(float, (*place, *quaternion_of(rotation)))
 
-    columns = [*(f"{axis}_m" for axis in "xyz"), *(f"q{axis}" for axis in "wxyz")]
-    world_body = len(columns)
-    yield Quantity(
-        [f"{name}_{column}" for name in names for column in columns],
-        lambda now: list(poses(now))[world_body:],
-        False,
-    )
+    yield Quantity([f"{name}_{column}" for name in names for column in POSE], poses, False)
     for name in named:
-        yield Quantity(
-            [f"{name}_{quantity}_{a}_{u}" for quantity, u in OF_BODIES.items() for a in "xyz"],
-            partial(numbers_of, name),
-            False,
-        )
+        yield Quantity(body_columns(name), partial(numbers_of, name), False)
 
 
 def of_fluid(setup: Setup) -> Iterator[Quantity]:
     """Where a domain is that moves, the budget of momentum, and how well the solves did."""
     window = None if setup.fluid is None else setup.fluid.window
     axes = () if window is None else window.axes
-    blows = bool(setup.mouths)
-
-    def worst(*names: str) -> Callable[[Moment], list[Any]]:
-        return lambda now: [max(getattr(step, name) for step in now.done.steps) for name in names]
-
-    def momenta(now: Moment) -> Iterator[float]:
-        steps, last = now.done.steps, now.done.step.momentum
-        for part in ("solid", "fluid"):
-            yield from map(float, getattr(last, part))
-        for part in (*IMPULSES, *(["jet"] if blows else [])):
-            whole = np.sum([getattr(step.momentum, part) for step in steps], axis=0)
-            yield from map(float, whole)
-
-    def errors(now: Moment) -> list[float]:
-        parts = [step.momentum for step in now.done.steps]
-        return [max(m.exchange_error for m in parts), max(m.budget_error for m in parts)]
-
     yield Quantity(
         [f"window_{'xyz'[axis]}_m" for axis in axes],
         lambda now: [now.world.flow()[0].grid.origin[axis] for axis in axes],
         False,
     )
-    kinds = ("solid", "fluid", *IMPULSES, *(["jet"] if blows else []))
-    yield Quantity([f"momentum_{kind}_{a}_Ns" for kind in kinds for a in "xyz"], momenta)
-    if blows:
-        yield Quantity(["expelled_m3"], lambda now: [sum(s.expelled for s in now.done.steps)])
-    yield Quantity(["momentum_exchange_error", "momentum_budget_error"], errors)
-    yield Quantity(["divergence_1/s"], worst("divergence"))
-    if setup.fluid is not None and setup.fluid.scalars:
-        yield Quantity(["dye_budget_error"], worst("dye_error"))
-    yield Quantity(
-        ["solver_iterations", "residual", "contacts", "fastest_m/s"],
-        worst("iterations", "residual", "contacts", "fastest"),
-    )
+    absent = {"work"}
+    if not setup.mouths:
+        absent |= {"momentum_jet", "expelled"}
+    if setup.fluid is None or not setup.fluid.scalars:
+        absent |= {"dye_budget_error"}
+    yield from (of_steps(name) for name in OF_STEPS if name not in absent)
+
+
+def of_steps(name: str) -> Quantity:
+    """One of OF_STEPS, of the whole frame."""
+    made = OF_STEPS[name]
+
+    def values(frame: FrameReport) -> list[float]:
+        assert made.frame is not None
+        whole = made.frame([getattr(step, name) for step in frame.steps])
+        return list(whole.tolist()) if made.axes else [whole]
+
+    unit = [made.unit] if made.unit else []
+    return Quantity(["_".join([name, *axis, *unit]) for axis in made.axes or [""]], values)
 
 
 def controlled_positions(model: SolidModel, controlled: Integers) -> dict[str, int]:
     """Column of the position of each controlled hinge and slide -> its place among the dofs."""
     places = {int(dof): n for n, dof in enumerate(controlled)}
     return {
-        position: places[dof]
+        joint_column(POSITION[kind], name): places[dof]
         for name in _joints(model)
-        if (position := _position(model, name)) is not None
+        if (kind := _kind(model, name)) in POSITION
         and (dof := int(model.dofs_of(name)[0])) in places
     }
 
 
-def numbers_of(name: str, now: Moment) -> list[float]:
+def numbers_of(name: str, now: Snapshot) -> list[float]:
     """Every quantity of OF_BODIES of a body, in its order."""
-    body = now.named.body(name)
-    state = (body.centre, body.velocity, body.angular_velocity)
-    parts = (*state, body.force, body.torque, body.added_mass_force, body.added_mass_torque)
-    found: list[float] = np.concatenate(parts).tolist()
+    body = now.sensed.body(name)
+    found: list[float] = np.concatenate([getattr(body, of) for of in OF_BODIES]).tolist()
     return found
 
 
@@ -396,24 +321,13 @@ def _at(values: Array, places: Mapping[str, int]) -> list[float]:
     return found
 
 
-def _position(model: SolidModel, joint: str) -> str | None:
-    """Column of the position of a hinge or a slide; None for other joints."""
-    kind = _kind(model, joint)
-    if kind not in POSITION:
-        return None
-    quantity, unit = POSITION[kind]
-    return f"{quantity}_{joint}_{unit}"
-
-
 def _components(model: SolidModel, joint: str) -> list[tuple[str, int]]:
     """Column and dof of each component of a joint's drive; none that a slab locks."""
     dofs, kind = model.dofs_of(joint), _kind(model, joint)
     if kind in POSITION:
-        column = f"torque_{joint}_Nm" if kind == HINGE else f"force_{joint}_N"
-        return [(column, int(dofs[0]))]
-    columns = [f"torque_{joint}_{axis}_Nm" for axis in "xyz"]
-    if len(dofs) > len(columns):
-        columns = [f"force_{joint}_{axis}_N" for axis in "xyz"] + columns
+        return [(joint_column("torque" if kind == HINGE else "force", joint), int(dofs[0]))]
+    of = ["force", "torque"] if len(dofs) > 3 else ["torque"]
+    columns = [joint_column(quantity, joint, axis) for quantity in of for axis in "xyz"]
     found = zip(columns, dofs.tolist(), strict=True)
     return [(column, dof) for column, dof in found if not model.locked[dof]]
 

@@ -19,10 +19,8 @@ import numpy as np
 from flowborne.base.errors import PartError, SceneError, WorkerError
 from flowborne.base.extras import missing_to_draw
 from flowborne.base.progress import RunProgress, Stage
-from flowborne.coupling.named import Sensed
 from flowborne.kernels.jit import compilation_watched
 from flowborne.runs.checkpoint import load_checkpoint, save_checkpoint, state_bytes
-from flowborne.runs.frame_report import PARTS, FrameReport
 from flowborne.runs.history import History
 from flowborne.runs.recorder import Recorder, write_model
 from flowborne.runs.run_folder import RunFolder, RunFolderError, cannot_write, check_space
@@ -34,7 +32,8 @@ from flowborne.scenes.notes import notes_of
 from flowborne.scenes.save import scene_to_resume, with_frames, write_scene
 from flowborne.scenes.seen import seen_bodies
 from flowborne.scenes.warn import warnings_of
-from flowborne.sim.simulation import BlowUpError, Simulation, Snapshot
+from flowborne.sim.frame import PARTS, FrameReport, Snapshot
+from flowborne.sim.simulation import BlowUpError, Simulation
 
 if TYPE_CHECKING:
     from flowborne.scenes.schema import Scene
@@ -197,7 +196,8 @@ class _Run:
             if folder.checkpoint.exists():
                 controller, setup = simulation.controller, simulation.setup
                 memory = None if controller is None else controller.memory_shapes(setup.solid.nq)
-                simulation.restore(Snapshot(*load_checkpoint(folder.checkpoint, setup, memory)))
+                world, frame, kept = load_checkpoint(folder.checkpoint, setup, memory)
+                simulation.restore(Snapshot(world, frame, None, kept))
             if simulation.frame > self.frames:
                 raise RunFolderError(
                     f"{folder.path} has {simulation.frame} frames already; ask for more of them, "
@@ -342,8 +342,7 @@ class _Run:
         self.history.sync()
         self.recorder.sync()
         now = self.simulation.snapshot()
-        felt = None if now.report is None else Sensed.of(now.report)
-        save_checkpoint(self.folder.checkpoint, now.world, now.frame, felt)
+        save_checkpoint(self.folder.checkpoint, now.world, now.frame, now.sensed)
 
     def _check_space(self, freed: int) -> None:
         """Raise RunFolderError if the remaining frames do not fit on the disc."""

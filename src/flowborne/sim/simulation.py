@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property, lru_cache
 from pathlib import Path
 from time import perf_counter
@@ -15,20 +15,21 @@ from threadpoolctl import ThreadpoolController
 
 from flowborne.base.errors import PartError, SceneError, described
 from flowborne.control.commands import Commands, Drives, drives_of, told_by
-from flowborne.coupling.named import BodyState, JointState, Named, Sensed
 from flowborne.coupling.report import BREAKDOWNS, Outcome, StepReport
 from flowborne.coupling.stream import FlowState, flow_at
 from flowborne.coupling.world import Setup, World
 from flowborne.fluid.boundary import SIDES
 from flowborne.kernels.arrays import Array, Integers, Mask
 from flowborne.kernels.jit import cores, kernel_threads
-from flowborne.runs.frame_report import PARTS, FrameReport
 from flowborne.runs.summary import BUDGET_OPEN
 from flowborne.scenes.changes import ChangeTable, values_at
 from flowborne.sim.columns import Columns
+from flowborne.sim.frame import PARTS, FrameReport, Snapshot
 from flowborne.solids.flesh import inversion
 from flowborne.solids.model import FREE, SLIDE
+from flowborne.solids.sensed import BodyState, JointState
 from flowborne.solids.surfaces import geom_boxes
+from flowborne.solids.trajectories import NOTHING_TOLD
 
 if TYPE_CHECKING:
     from flowborne.control.controller import Controller
@@ -60,15 +61,6 @@ class BlowUpError(Exception):
 
     def __reduce__(self) -> tuple[type[BlowUpError], tuple[int, int, str, bool]]:
         return BlowUpError, (self.frame, self.step, self.cause, self.fault)
-
-
-@dataclass(frozen=True, eq=False)
-class Snapshot:
-    """The state after some frames, and what the last one said of bodies and joints."""
-
-    world: World
-    frame: int
-    report: FrameReport | Sensed | None
 
 
 class Simulation:
@@ -132,9 +124,7 @@ class Simulation:
 
         raises  SceneError if the bodies and the fluid cannot be started, on the first use
         """
-        if not self._started:
-            self._start()
-        return self._moment.world
+        return self.snapshot().world
 
     @property
     def setup(self) -> Setup:
@@ -154,8 +144,7 @@ class Simulation:
     @property
     def report(self) -> FrameReport | None:
         """Report of the last frame; None before the first, and when going on from a checkpoint."""
-        report = self._moment.report
-        return report if isinstance(report, FrameReport) else None
+        return self._moment.report
 
     @property
     def changes(self) -> tuple[ChangeTable, ...]:
@@ -179,7 +168,9 @@ class Simulation:
 
     def snapshot(self) -> Snapshot:
         """The state now. A frame makes a new one, so it costs nothing to keep."""
-        return replace(self._moment, world=self.world)
+        if not self._started:
+            self._start()
+        return self._moment
 
     def restore(self, snapshot: Snapshot, changes: Iterable[ChangeTable] | None = None) -> None:
         """Continue from a state of the same scene, to the same bits.
@@ -208,18 +199,15 @@ class Simulation:
                 raise BlowUpError(self.frame + 1, 1, str(error)) from error
         beyond: tuple[str, ...] = ()
         if commands:
-            told, beyond = told_by(commands, world, self.frame_time, self._drives())
-            world.setup = world.setup.but(told=told)
+            world.told, beyond = told_by(commands, world, self.frame_time, self._drives())
         with _one_blas_thread(), kernel_threads():
-            report = replace(
-                self._advance(world, self.frame + 1), beyond=beyond, values=self._values
-            )
-        if commands:
-            world.setup = self.setup.where(world.setup)
-        lost = self.columns.lost(self.columns.values(world, report.frame, report))
+            report = self._advance(world, self.frame + 1, beyond)
+        world.told = NOTHING_TOLD
+        moment = Snapshot(world, report.frame, report)
+        lost = self.columns.lost(self.columns.values(moment))
         if lost:
             raise BlowUpError(report.frame, self.steps_per_frame, f"{lost} is not a finite number")
-        self._moment = Snapshot(world, report.frame, report)
+        self._moment = moment
         return report
 
     def flow_at(self, body: str, points: Array) -> FlowState:
@@ -236,17 +224,14 @@ class Simulation:
 
         raises  ValueError for an unknown name
         """
-        return self._named().body(name)
+        return self.snapshot().sensed.body(name)
 
     def joint(self, name: str) -> JointState:
         """Position, velocity and drive force of a joint now, in SI units; see `JointState`.
 
         raises  ValueError for an unknown name
         """
-        return self._named().joint(name)
-
-    def _named(self) -> Named:
-        return Named.after(self.world, self._moment.report)
+        return self.snapshot().sensed.joint(name)
 
     def _apply_changes(self) -> None:
         """Remake setup and controller where the coming frame has other values than the last one."""
@@ -282,7 +267,7 @@ class Simulation:
 
         Values that only a step can give are nan before the first frame.
         """
-        return self.columns.values(self.world, self.frame, self.report)
+        return self.columns.values(self.snapshot())
 
     def close(self) -> None:
         """Stop the controller's workers."""
@@ -321,8 +306,8 @@ class Simulation:
             ) from error
         self._started = True
 
-    def _advance(self, world: World, frame: int) -> FrameReport:
-        """Advance `world` by a frame, in place."""
+    def _advance(self, world: World, frame: int, beyond: tuple[str, ...]) -> FrameReport:
+        """Advance `world` by a frame, in place; `beyond` as in its report."""
         started = perf_counter()
         controller, dt = self.controller, self.frame_time / self.steps_per_frame
         end = world.time + self.frame_time
@@ -367,6 +352,8 @@ class Simulation:
             targets=targets,
             decided=decided,
             seconds=seconds,
+            beyond=beyond,
+            values=self._values,
         )
 
 
@@ -385,7 +372,9 @@ def _enough_memory(scene: Scene) -> Iterator[None]:
 def trouble(world: World, report: StepReport) -> str | None:
     """Why the world cannot be advanced after the step of `report`, or None."""
     if report.outcome is Outcome.PRESSURE_NOT_CONVERGED:
-        detail = f"relative residual {report.residual:.2g} after {report.iterations} iterations"
+        detail = (
+            f"relative residual {report.residual:.2g} after {report.solver_iterations} iterations"
+        )
         return f"{report.outcome.value} ({detail})"
     if report.outcome is Outcome.NOT_SETTLED and report.unsettled.size:
         return f"{report.outcome.value} (at {_listed(world, report.unsettled)})"
@@ -430,7 +419,7 @@ def departed(world: World, report: StepReport) -> str | None:
     grid, h = fluid.grid, fluid.grid.spacing
     body, low = np.arange(model.nbody), report.centre
     high = low
-    if report.momentum.budget_error > BUDGET_OPEN:
+    if report.momentum_budget_error > BUDGET_OPEN:
         first, last = geom_boxes(model, world.solid.q)
         body = np.append(body, model.geom_body)
         low, high = np.concatenate([low, first + h]), np.concatenate([high, last - h])

@@ -185,12 +185,12 @@ def momentum_kept(cells: int, steps: int) -> tuple[float, float]:
     model, dt = world.setup.solid, PERIOD / steps
     change = largest = exchange = 0.0
     for _ in range(steps):
-        balance = advance(world, dt).momentum
+        report = advance(world, dt)
         creature = halfway_momentum(model, world.solid, dt)[0]
-        total = creature + balance.fluid
+        total = creature + report.momentum_fluid
         change = max(change, float(np.abs(total).max()))
         largest = max(largest, float(np.abs(creature).max()))
-        exchange = max(exchange, balance.exchange_error)
+        exchange = max(exchange, report.momentum_exchange_error)
     return change / largest, exchange
 
 

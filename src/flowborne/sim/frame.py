@@ -1,21 +1,24 @@
-"""What a frame of a simulation did: forces as means over it."""
+"""What a frame of a simulation did, and the state after it."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from flowborne.coupling.report import StepReport
-from flowborne.fluid.grid import Array
+from flowborne.coupling.world import World
+from flowborne.kernels.arrays import Array
+from flowborne.solids.sensed import Sensed
 
 PARTS = ("advection", "viscosity", "projection", "geometry", "solids", "control")
 """Where the time of a frame goes."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class FrameReport:
     """What a frame did.
 
@@ -49,39 +52,46 @@ class FrameReport:
         """Report of the last step."""
         return self.steps[-1]
 
-    @property
-    def velocity(self) -> Array:
-        """(nv,) at the end of the frame."""
-        return self.step.velocity
-
-    @property
-    def acceleration(self) -> Array:
-        """(nv,) change of v in the last step by dt."""
-        return self.step.acceleration
-
-    @property
-    def dt(self) -> float:
-        """Length of the last step, s."""
-        return self.step.dt
-
-    @property
-    def actuator(self) -> Array:
-        """(nv,) generalised force of the drives in the last step, N or N m."""
-        return self.step.actuator
-
     def mean(self, of: Callable[[StepReport], Array]) -> Array:
         """Mean over the frame of a force of each step: its impulse over the frame's time."""
         time = sum(step.dt for step in self.steps)
         return np.asarray(sum(step.dt * of(step) for step in self.steps) / time)
 
-    def central_wrench(self) -> Array:
-        """(nbody, 6) mean force of fluid and winds, and torque about each body's centre of mass."""
-        return self.mean(StepReport.central_wrench)
+    def power(self) -> Array:
+        """(nv,) mean power of the drives, W."""
+        return self.mean(lambda step: step.actuator * step.velocity)
 
-    def central_added_mass(self) -> Array:
-        """(nbody, 6) the part of it with which the fluid resists the bodies' acceleration."""
-        return self.mean(StepReport.central_added_mass)
+    def sensed(self, world: World) -> Sensed:
+        """What can be sensed of the bodies and joints of `world` after the frame: forces on bodies
+        are means over it, all else is of its last step."""
+        return replace(
+            self.step.sensed(world),
+            wrench=self.mean(StepReport.central_wrench),
+            added_mass=self.mean(StepReport.central_added_mass),
+        )
 
     def drag(self) -> Array:
         """(nbody, 3) mean force of fluid and winds on bodies that keep their velocities, N."""
-        return (self.central_wrench() - self.central_added_mass())[:, :3]
+        added_mass = self.mean(StepReport.central_added_mass)
+        return (self.mean(StepReport.central_wrench) - added_mass)[:, :3]
+
+
+@dataclass(frozen=True, eq=False)
+class Snapshot:
+    """The state after some frames.
+
+    report  of the last one; None before the first, and after a checkpoint
+    kept    what a checkpoint says of bodies and joints
+    """
+
+    world: World
+    frame: int
+    report: FrameReport | None
+    kept: Sensed | None = None
+
+    @cached_property
+    def sensed(self) -> Sensed:
+        """Bodies and joints by their names."""
+        if self.report is not None:
+            return self.report.sensed(self.world)
+        return self.kept or Sensed.before_steps(self.world.setup.solid, self.world.solid.q)
