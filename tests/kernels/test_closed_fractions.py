@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flowborne.kernels.arrays import CLOSED, OPEN, PERIODIC
+from flowborne.kernels.arrays import FREE, PERIODIC, PRESCRIBED
 from flowborne.kernels.closed_fractions import (
     CREASE,
     close_faces,
@@ -53,13 +53,13 @@ def test_count_beside(shape: tuple[int, int, int]) -> None:
 
 @pytest.mark.parametrize(("shape", "axis"), AXES)
 @pytest.mark.parametrize(
-    "sides", [(OPEN, OPEN), (CLOSED, OPEN), (OPEN, CLOSED), (PERIODIC, PERIODIC)]
+    "sides", [(FREE, FREE), (PRESCRIBED, FREE), (FREE, PRESCRIBED), (PERIODIC, PERIODIC)]
 )
 def test_shares_and_their_list(
     shape: tuple[int, int, int], axis: int, sides: tuple[int, int]
 ) -> None:
     """Some faces in a crease and just below its limit."""
-    made, codes, random = cut(shape), np.array(sides), np.random.default_rng(3)
+    made, ends, random = cut(shape), np.array(sides), np.random.default_rng(3)
     beside = random.integers(0, 3, shape)
     share = face_closed_reference(made.phi, axis)
     centre = random.uniform(-0.5, 0.5, (2, *share.shape))
@@ -71,7 +71,7 @@ def test_shares_and_their_list(
     union = face_closed_reference(made.distance, axis)
     assert ((union > 1.0 - 10.0 * CREASE) & (union < 1.0)).any()
     parts = opened, total, made.distance
-    rest = beside, made.box, axis, codes
+    rest = beside, made.box, axis, ends
     expected, opening = share_closed_reference(share, *parts, *rest)
     count = share_closed(share, centre, *parts, made.crossings, *rest, made.flat)
     np.testing.assert_allclose(share, expected, atol=1e-14)

@@ -8,6 +8,7 @@ from itertools import product
 import numpy as np
 import pytest
 
+from flowborne.kernels.arrays import FREE, PERIODIC, PRESCRIBED
 from flowborne.kernels.control_volumes import (
     DRIVEN,
     fill_empty,
@@ -255,7 +256,8 @@ def test_sort_faces(shape: tuple, periodic: tuple, component: int, told: tuple) 
     part = find_parts_reference(case.volumes, 0.2 * cell, component, case.wraps)
     volumes, kinds = np.empty(case.shape), np.empty(case.shape, np.uint8)
     counts, limits = np.empty((np.prod(case.shape[:2]), 3), np.int64), (cell, 0.2, slack, 0.01)
-    sort_faces(volumes, kinds, counts, case.cells, case.opened, component, prescribed, ring, limits)
+    ends = np.full(2, PERIODIC) if ring else np.where(prescribed, PRESCRIBED, FREE)
+    sort_faces(volumes, kinds, counts, case.cells, case.opened, component, ends, limits)
     np.testing.assert_array_equal(volumes, case.volumes)
     np.testing.assert_array_equal(kinds & DRIVEN, driven)
     for found, expected in zip(listed_kinds(kinds, counts), (part, shut, uneven), strict=True):
@@ -269,6 +271,6 @@ def test_a_closed_face_whose_cells_cancel_passes_on_what_it_gets() -> None:
     cells[2:4, 0, 0] = 1e-13, -1e-13
     volumes, kinds = np.empty((7, 1, 1)), np.empty((7, 1, 1), np.uint8)
     counts, limits = np.empty((7, 3), np.int64), (1.0, 0.2, 0.1, 1e-9)
-    sort_faces(volumes, kinds, counts, cells, opened, 0, np.zeros(2, np.uint8), False, limits)
+    sort_faces(volumes, kinds, counts, cells, opened, 0, np.full(2, FREE), limits)
     assert volumes[3] == 0.0
     np.testing.assert_array_equal(listed_kinds(kinds, counts)[1], (2, 3, 4))

@@ -14,7 +14,7 @@ from flowborne.coupling.shapes import Shapes
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.ghosts import edge
 from flowborne.fluid.grid import Array, Faces, Grid, faces_of
-from flowborne.kernels.arrays import CLOSED, Integers, Mask, Rows
+from flowborne.kernels.arrays import PRESCRIBED, Integers, Mask, Rows
 from flowborne.kernels.closed_fractions import (
     close_faces,
     count_beside,
@@ -86,19 +86,11 @@ class Geometry:
     images: Images
 
 
-def beside_sides(shape: Integers, walls: Integers) -> Integers:
-    """(nx, ny, nz) how many solid sides bound each cell.
-
-    walls  (3, 2) 1 where the lower or upper side across an axis is solid or an inflow
-    """
-    beside = np.zeros(shape, np.int64)
-    beside[0] += walls[0, 0]
-    beside[-1] += walls[0, 1]
-    beside[:, 0] += walls[1, 0]
-    beside[:, -1] += walls[1, 1]
-    if shape[2] > 1:
-        beside[:, :, 0] += walls[2, 0]
-        beside[:, :, -1] += walls[2, 1]
+def beside_sides(grid: Grid, boundaries: Boundaries) -> Integers:
+    """(nx, ny, nz) how many sides that prescribe the flux bound each cell."""
+    beside = np.zeros(grid.shape, np.int64)
+    for place, side in boundaries.around(grid):
+        beside[place.layer] += side.normal == PRESCRIBED
     return beside
 
 
@@ -233,13 +225,12 @@ def geometry(
     skins, first_skin   of the fleshes, and the number of bodies
     """
     nx, ny, nz = grid.shape
-    shape, flat = np.array(grid.shape), grid.is_slab
+    flat = grid.is_slab
     h, area = grid.spacing, grid.face_area
-    codes = boundaries.codes()
-    walls = (codes == CLOSED).astype(np.int64)
+    normal = boundaries.normal()
     distance = np.full((nx + 1, ny + 1, nz + 1), BAND * h)
     nearest = np.zeros((nx + 1, ny + 1, nz + 1), np.int64)
-    beside = beside_sides(shape, walls)
+    beside = beside_sides(grid, boundaries)
     ox, oy, oz = opened = [np.ones(grid.face_shape(d)) for d in range(3)]
     total = grid.zeros_faces()
     boxes = body_boxes(shapes, position, rotation, first_skin)
@@ -270,7 +261,7 @@ def geometry(
         for d in grid.axes:
             parts += share_closed(
                 share[d], middle[d], opened[d], total[d], distance, crossings, beside, piece.box, d,
-                codes[d], flat,
+                normal[d], flat,
             )  # fmt: skip
     for d in around:
         join_ends(opened[d], d)
@@ -281,7 +272,7 @@ def geometry(
             counts = np.array(grid.face_shape(d))
             into = axis, face, part_body, closed, centre
             last = list_closed(share[d], middle[d], piece.box, d, piece.body, counts, last, *into)
-    kind = kinds_of_cells(ox, oy, oz, walls)
+    kind = kinds_of_cells(ox, oy, oz, normal)
     with_rows = kind >= NARROW
     bones = [each for each in own if each[0].body < first_skin]
     middles = np.concatenate([boxes.mean(axis=1), skins.middle])

@@ -88,20 +88,20 @@ def moving_volumes(
 ) -> tuple[Array, Integers, Closed, Transfers]:
     """What moves with the faces across an axis, and what `ControlVolumes` has of them."""
     axis, shape, wraps = kernel_axes(component, grid, boundaries)
-    told, ring, cell = boundaries.prescribed(component), wraps[axis] > 0, grid.cell_volume
+    ends, cell = boundaries.normal()[component], grid.cell_volume
     room, wide = plane(cells, grid), planes(opened, grid)
     found, kinds = np.empty(grid.face_shape(component)), np.empty(shape, np.uint8)
     volume = plane(found, grid)
     counts = np.empty((shape[0] * shape[1], 3), np.int64)
     limits = cell, WHOLE, SLACK * cell, NOTHING * cell
-    sort_faces(volume, kinds, counts, room, wide[axis], axis, told, ring, limits)
+    sort_faces(volume, kinds, counts, room, wide[axis], axis, ends, limits)
     cut, shut, uneven = listed_kinds(kinds, counts)
     targets = find_targets(shut, kinds, wide[axis], volume, room, axis, wraps)
     closed = Closed(shut, *targets)
     for _ in range(ROUNDS):
         uneven = np.sort(with_neighbours(uneven, kinds, shape, wraps))
     given = share_out(volume, closed, kinds, uneven, room, wide, axis, wraps, cell)
-    if ring:
+    if wraps[axis] > 0:
         found[edge(component, -1)] = found[edge(component, 0)]
     return found, cut, closed, given
 

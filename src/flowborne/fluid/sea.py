@@ -14,6 +14,7 @@ import numpy as np
 from flowborne.fluid.grid import Array
 from flowborne.fluid.sides.far import BoundaryFar, Velocity
 from flowborne.fluid.sides.side import Boundary, Place
+from flowborne.kernels.arrays import FREE, PRESCRIBED
 
 PARTLY = (
     "far sides have a velocity, and other sides take part in the flow. Make every side far, or "
@@ -67,7 +68,7 @@ def sea_of(sides: Sequence[tuple[Place, Boundary]]) -> Sea | None:
     if not in_sea(kinds):
         return None
     leaves = [place for place, side in far if side.is_exit(place)]
-    mirrors = tuple(place for place, side in sides if side.mirrors)
+    mirrors = tuple(place for place, side in sides if is_mirror(side))
     return Sea(first, tuple(p for p, _ in far), mirrors, leaves[0] if leaves else None)
 
 
@@ -75,10 +76,15 @@ Kinds = Sequence[tuple[int, Boundary | type[Boundary]]]
 """The sides of a domain, or their kinds, each with the axis that it is across."""
 
 
+def is_mirror(side: Boundary | type[Boundary]) -> bool:
+    """Whether the flow beyond a side would be the mirror image of that inside."""
+    return side.normal == PRESCRIBED and side.tangential == FREE
+
+
 def in_sea(sides: Kinds) -> bool:
     """Whether all sides are far, or mirrors opposite far ones."""
     far = {axis for axis, side in sides if side.endless}
-    return all(side.endless or (side.mirrors and axis in far) for axis, side in sides)
+    return all(side.endless or (is_mirror(side) and axis in far) for axis, side in sides)
 
 
 def stream_problem(velocity: Velocity, sides: Kinds) -> str | None:
@@ -87,7 +93,7 @@ def stream_problem(velocity: Velocity, sides: Kinds) -> str | None:
         return None
     if not in_sea(sides):
         return PARTLY
-    return ACROSS if any(velocity[axis] for axis, side in sides if side.mirrors) else None
+    return ACROSS if any(velocity[axis] for axis, side in sides if is_mirror(side)) else None
 
 
 def number_of(place: Place) -> int:

@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 ROUNDING = 1e-15
 """Relative size of what is a rounding error of numbers in double precision."""
 
-CLOSED, OPEN, PERIODIC = range(3)
-"""What a side is to the pressure: a wall or an inflow, p = 0, or the opposite side."""
+PRESCRIBED, PERIODIC, FREE = -1, 0, 1
+"""a in u_ghost = a u_inside + b beyond a side: it gives the component of velocity on it, is the
+opposite side, or leaves the component to the flow; see `fluid.sides.side`."""
 
 Array = NDArray[np.float64]
 Faces = tuple[Array, Array, Array]

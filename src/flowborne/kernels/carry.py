@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit, prange
 
-from flowborne.kernels.arrays import Array, Faces, Integers, Marks
+from flowborne.kernels.arrays import FREE, PERIODIC, PRESCRIBED, Array, Faces, Integers, Marks
 from flowborne.kernels.control_volumes import (
     Closed,
     Transfers,
@@ -26,12 +26,8 @@ from flowborne.kernels.face_masses import add_transfers, give, place_of
 from flowborne.kernels.flux import CLEAR, CUT, GHOSTS, UPSTREAM, pad_field, stage
 from flowborne.kernels.jit import kernel
 
-MIRRORED, HELD, PRESCRIBED, JOINED = range(4)
-"""Ghosts beyond a side: those inside mirrored, the layer at the side held, such that the mean of
-both is what the side prescribes, or what is inside the opposite side."""
-
-AXIS, UPPER, BEYOND, FREE, SUPPLIES, FIRST, IRROTATIONAL = range(7)
-"""Columns of the table of sides: where the side lies, what is beyond it, whether it is free and
+AXIS, UPPER, NORMAL, TANGENTIAL, SUPPLIES, FIRST, IRROTATIONAL = range(7)
+"""Columns of the table of sides: where the side lies, a of the velocity across and along it and
 whether it supplies fluid (see `fluid.sides.side`), where its layer begins in packed layers, and
 whether what comes in through a free side has `Sides.change` more beyond it than inside."""
 
@@ -129,31 +125,32 @@ def layer(row: Integers, field: Array, shape: Integers) -> tuple[int, int, int, 
 
 @njit(nogil=True, cache=True)
 def fill_ghosts(field: Array, sides: Sides, time: int, shape: Integers, component: int) -> None:
-    """Set the two layers of ghosts around a padded field such that they carry the conditions at the
-    sides, in place; corners are left alone.
+    """Set the two layers of ghosts around a padded field, u_ghost = a u_inside + b, in place;
+    corners are left alone.
+
+    Along a side whose flux is prescribed the second ghost is of the second layer inside. Elsewhere
+    both are of the first one: beyond free sides and, with a = 1, across the component's own ones.
 
     time  row of what the sides prescribe
     """
     flat = field.reshape(-1)
     for s in range(sides.table.shape[0]):
         row = sides.table[s]
-        beyond, first = row[BEYOND], row[FIRST]
+        own, first = row[AXIS] == component, row[FIRST]
         start, out, one, other, n, m, length = layer(row, field, shape)
-        period = (length - int(row[AXIS] == component)) * out
-        for a in range(n):
-            for b in range(m):
-                at = start + a * one + b * other
-                if beyond == HELD:
-                    flat[at + out] = flat[at + 2 * out] = flat[at]
-                elif beyond == MIRRORED:
-                    flat[at + out], flat[at + 2 * out] = flat[at], flat[at - out]
-                elif beyond == PRESCRIBED:
-                    twice = 2.0 * sides.wall[time, first + a * m + b]
-                    flat[at + out] = twice - flat[at]
-                    flat[at + 2 * out] = twice - flat[at - out]
-                else:
+        period = (length - int(own)) * out
+        factor = 1.0 if own else float(row[TANGENTIAL])
+        inward = out if row[NORMAL] == PRESCRIBED and not own else 0
+        for i in range(n):
+            for j in range(m):
+                at = start + i * one + j * other
+                if row[NORMAL] == PERIODIC:
                     flat[at + out] = flat[at + out - period]
                     flat[at + 2 * out] = flat[at + 2 * out - period]
+                else:
+                    b = 2.0 * sides.wall[time, first + i * m + j] if factor < 0.0 else 0.0
+                    flat[at + out] = factor * flat[at] + b
+                    flat[at + 2 * out] = factor * flat[at - inward] + b
 
 
 @njit(nogil=True, cache=True)
@@ -173,7 +170,7 @@ def mark_volumes(
         for a in range(n):
             for b in range(m):
                 at_side = start + a * one + b * other
-                if row[BEYOND] == JOINED:
+                if row[NORMAL] == PERIODIC:
                     if own and not row[UPPER]:  # the last faces are the first ones
                         flat[at_side - period] = flat[at_side]
                     flat[at_side + out] = flat[at_side + out - period]
@@ -181,7 +178,7 @@ def mark_volumes(
                     continue
                 flat[at_side + out] = flat[at_side + 2 * out] = CUT
                 if own:
-                    flat[at_side] = UPSTREAM if row[FREE] else CUT
+                    flat[at_side] = UPSTREAM if row[NORMAL] == FREE else CUT
 
 
 @njit(nogil=True, cache=True)
@@ -242,7 +239,7 @@ def cross_sides(sides: Sides, flux: Fluxes, cells: Array, component: int, shape:
     for s in range(sides.table.shape[0]):
         row = sides.table[s]
         axis, upper, first = row[AXIS], row[UPPER], row[FIRST]
-        if row[BEYOND] == JOINED:
+        if row[NORMAL] == PERIODIC:
             continue
         q, total = across_axis(flux.through, axis), 0.0
         one, other = int(axis == 0), 2 - int(axis == 2)
@@ -296,7 +293,7 @@ def joined(table: Integers, axis: int) -> bool:
     """Whether an axis is periodic."""
     found = False
     for s in range(table.shape[0]):
-        found |= table[s, AXIS] == axis and table[s, BEYOND] == JOINED
+        found |= table[s, AXIS] == axis and table[s, NORMAL] == PERIODIC
     return found
 
 
@@ -308,19 +305,19 @@ def draw_in(field: Array, marks: Marks, sides: Sides, shape: Integers) -> float:
     flat, mark, came = field.reshape(-1), marks.reshape(-1), 0.0
     for s in range(sides.table.shape[0]):
         row = sides.table[s]
-        first = row[FIRST]
-        if row[BEYOND] == JOINED:
+        first, free = row[FIRST], row[NORMAL] == FREE
+        if row[NORMAL] == PERIODIC:
             continue
         start, out, one, other, n, m, _ = layer(row, field, shape)
         mean = 0.0
-        for a in range(n if row[FREE] else 0):
+        for a in range(n if free else 0):
             for b in range(m):
                 mean += sides.share[first + a * m + b] * flat[start + a * one + b * other]
         for a in range(n):
             for b in range(m):
                 at, rate = start + a * one + b * other, sides.rate[first + a * m + b]
                 upstream = mark[at] == UPSTREAM
-                if row[FREE] and rate > 0.0:
+                if free and rate > 0.0:
                     if row[IRROTATIONAL]:
                         flat[at + out] = flat[at] + sides.change[first + a * m + b]
                     else:
@@ -369,7 +366,7 @@ def empty_at_walls(
     flat, volumes, given = amount.reshape(-1), volume.reshape(-1), 0.0
     for s in range(sides.table.shape[0]):
         row = sides.table[s]
-        if row[FREE] or row[BEYOND] == JOINED or row[AXIS] != component:
+        if row[NORMAL] != PRESCRIBED or row[AXIS] != component:
             continue
         start, _, one, other, n, m, _ = layer(row, amount, shape)
         for a in range(n):

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from flowborne.kernels.arrays import CLOSED, PERIODIC, Array, Integers
+from flowborne.kernels.arrays import PERIODIC, PRESCRIBED, Array, Integers
 from flowborne.kernels.cut_faces import closed_face, crossing_from, is_cut, nodes_inside, other_axes
 from flowborne.kernels.edge_crossings import Crossings
 from flowborne.kernels.jit import inlined
@@ -90,7 +90,7 @@ def in_a_crease(beside: Integers, axis: int, i: int, j: int, k: int, ring: bool)
 @njit(nogil=True, cache=True)
 def share_closed(
     share: Array, centre: Array, opened: Array, total: Array, distance: Array, found: Crossings,
-    beside: Integers, box: Integers, axis: int, codes: Integers, flat: bool,
+    beside: Integers, box: Integers, axis: int, ends: Integers, flat: bool,
 ) -> int:  # fmt: skip
     """This body's part of each closed face in its box, and the open fractions; counts parts.
 
@@ -99,11 +99,11 @@ def share_closed(
     total     the sum of what each body alone closes
     distance, found  to all bodies at the nodes, and where edges cross any
     beside    (nx, ny, nz) how many bodies and solid sides bound each cell
-    codes     (2,) of the lower and upper side across `axis`: at a CLOSED one the side, not the
-              body, decides what crosses
+    ends      (2,) a of the velocity across the sides on `axis`: at a PRESCRIBED one the side, not
+              the body, decides what crosses
     """
     count = 0
-    last, ring = opened.shape[axis] - 1, codes[0] == PERIODIC
+    last, ring = opened.shape[axis] - 1, ends[0] == PERIODIC
     for a in range(share.shape[0]):
         for b in range(share.shape[1]):
             for c in range(share.shape[2]):
@@ -121,7 +121,7 @@ def share_closed(
                     centre[:, a, b, c] = 0.0
                 opened[i, j, k] = 1.0 - union
                 n = i if axis == 0 else (j if axis == 1 else k)
-                if (n == 0 and codes[0] == CLOSED) or (n == last and codes[1] == CLOSED):
+                if (n == 0 and ends[0] == PRESCRIBED) or (n == last and ends[1] == PRESCRIBED):
                     share[a, b, c] = 0.0
                     continue
                 share[a, b, c] = union * own / all_own

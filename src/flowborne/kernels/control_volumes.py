@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit, prange
 
-from flowborne.kernels.arrays import Array, Faces, Integers, Marks
+from flowborne.kernels.arrays import PERIODIC, PRESCRIBED, Array, Faces, Integers, Marks
 from flowborne.kernels.faces import mean_row
 from flowborne.kernels.jit import inlined, kernel
 
@@ -358,8 +358,7 @@ def sort_faces(
     cells: Array,
     opened: Array,
     component: int,
-    prescribed: Marks,
-    periodic: bool,
+    ends: Integers,
     limits: tuple[float, float, float, float],
 ) -> None:
     """Control volumes of the faces of a component, V_f = (V_L + V_R) / 2, and their kinds.
@@ -367,14 +366,15 @@ def sort_faces(
     The first and last ones along its own axis are half as large, and the last is the first one
     where that is periodic: it counts as none.
 
-    kinds       see `kind_of`
-    counts      (n0 n1, 3) in each row how many are PART, SHUT and UNEVEN
-    prescribed  (2,) 1 where the velocity of the first or last layer is prescribed
-    limits      volume of a cell; part of it below which control volumes are cut; `slack` and
-                `nothing`, see `kind_of`
+    kinds   see `kind_of`
+    counts  (n0 n1, 3) in each row how many are PART, SHUT and UNEVEN
+    ends    (2,) a of the velocity on the first and the last layer, see `fluid.sides.side`
+    limits  volume of a cell; part of it below which control volumes are cut; `slack` and
+            `nothing`, see `kind_of`
     """
     n0, n1, n2 = opened.shape
     last, (cell, bound, slack, nothing) = opened.shape[component] - 1, limits
+    periodic = ends[0] == PERIODIC
     for row in prange(n0 * n1):
         i, j = np.int64(row) // n1, np.int64(row) % n1
         at = i if component == 0 else j
@@ -391,8 +391,8 @@ def sort_faces(
                 at = 1
             outer = at == 0 or at == last
             double = periodic and at == last
-            own = not double and not (at == 0 and prescribed[0])
-            own = own and not (at == last and prescribed[1])
+            own = not double and not (at == 0 and ends[0] == PRESCRIBED)
+            own = own and not (at == last and ends[1] == PRESCRIBED)
             least = bound * (0.0 if double else (0.5 if outer and not periodic else 1.0))
             goal = cell * (0.5 if outer and not periodic else 1.0)
             for k in range(start, stop):

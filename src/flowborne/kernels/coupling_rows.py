@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
-from flowborne.kernels.arrays import Array, Faces, Integers, Rows
+from flowborne.kernels.arrays import PRESCRIBED, Array, Faces, Integers, Rows
 from flowborne.kernels.jit import inlined, kernel
 
 Kinds = NDArray[np.int8]
@@ -39,26 +39,26 @@ class ClosedParts(NamedTuple):
 
 
 @inlined
-def through(walls: Integers, axis: int, end: int, at_end: bool) -> float:
-    """0 for a face on a side that is solid or an inflow, 1 for others."""
-    return 0.0 if at_end and walls[axis, end] == 1 else 1.0
+def through(normal: Integers, axis: int, end: int, at_end: bool) -> float:
+    """0 for a face on a side that prescribes the flux through it, 1 for others."""
+    return 0.0 if at_end and normal[axis, end] == PRESCRIBED else 1.0
 
 
 @kernel
-def kinds_of_cells(ox: Array, oy: Array, oz: Array, walls: Integers) -> Kinds:
+def kinds_of_cells(ox: Array, oy: Array, oz: Array, normal: Integers) -> Kinds:
     """(nx, ny, nz) kind of each cell.
 
-    walls  (3, 2) 1 where the lower or upper side across an axis is solid or an inflow
+    normal  (3, 2) a of the velocity across the sides, see `fluid.sides.side`
     """
     n0, n1, n2 = oy.shape[0], ox.shape[1], ox.shape[2]
     kind = np.empty((n0, n1, n2), np.int8)
-    first, last = through(walls, 2, 0, True), through(walls, 2, 1, True)
+    first, last = through(normal, 2, 0, True), through(normal, 2, 1, True)
     for i in prange(n0):
-        below0 = through(walls, 0, 0, i == 0)
-        above0 = through(walls, 0, 1, i == n0 - 1)
+        below0 = through(normal, 0, 0, i == 0)
+        above0 = through(normal, 0, 1, i == n0 - 1)
         for j in range(n1):
-            below1 = through(walls, 1, 0, j == 0)
-            above1 = through(walls, 1, 1, j == n1 - 1)
+            below1 = through(normal, 1, 0, j == 0)
+            above1 = through(normal, 1, 1, j == n1 - 1)
             beside = below0 + above0 + below1 + above1 < 4.0
             for k in range(n2):
                 widest = max(below0 * ox[i, j, k], above0 * ox[i + 1, j, k])

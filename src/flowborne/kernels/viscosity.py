@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit, prange
 
-from flowborne.kernels.arrays import CLOSED, PERIODIC, Array, Integers, Marks
+from flowborne.kernels.arrays import PERIODIC, PRESCRIBED, Array, Integers, Marks
 from flowborne.kernels.cut_faces import closed_face, open_edge, other_axes
 from flowborne.kernels.edge_crossings import Crossings
 from flowborne.kernels.jit import kernel
@@ -43,8 +43,11 @@ def face_distances(distance: Array, axis: int, out: Array) -> None:
 
 
 @kernel
-def classify(kind: Marks, opened: Array, axis: int, codes: Integers, touching: float) -> None:
-    """Kind of every face across `axis` from its open part."""
+def classify(kind: Marks, opened: Array, axis: int, normal: Integers, touching: float) -> None:
+    """Kind of every face across `axis` from its open part.
+
+    normal  (3, 2) a of the velocity across the sides, see `fluid.sides.side`
+    """
     last = kind.shape[axis] - 1
     for i in prange(kind.shape[0]):
         for j in range(kind.shape[1]):
@@ -53,11 +56,11 @@ def classify(kind: Marks, opened: Array, axis: int, codes: Integers, touching: f
                 kind[i, j, k] = UNKNOWN
                 if opened[i, j, k] == 0.0:
                     kind[i, j, k] = INACTIVE
-                elif (at == 0 and codes[axis, 0] == CLOSED) or (
-                    at == last and codes[axis, 1] == CLOSED
+                elif (at == 0 and normal[axis, 0] == PRESCRIBED) or (
+                    at == last and normal[axis, 1] == PRESCRIBED
                 ):
                     kind[i, j, k] = GIVEN
-                elif at == last and codes[axis, 1] == PERIODIC:
+                elif at == last and normal[axis, 1] == PERIODIC:
                     kind[i, j, k] = INACTIVE
                 elif opened[i, j, k] <= touching:
                     kind[i, j, k] = TIED
@@ -209,7 +212,7 @@ def meet_walls(
     centre: Array,
     parts: Array,
     stiffness: float,
-    codes: Integers,
+    normal: Integers,
     beside: Integers,
     wall: Array,
     gap: Array,
@@ -227,7 +230,7 @@ def meet_walls(
     """
     flat = parts.shape[2] == 1
     others = other_axes(axis)
-    count = kind.shape[axis] - int(codes[axis, 0] == PERIODIC)
+    count = kind.shape[axis] - int(normal[axis, 0] == PERIODIC)
     step = (int(axis == 0), int(axis == 1), int(axis == 2))
     total, pull = np.zeros(2), np.zeros(2)
     for n in range(beside.size):
@@ -240,7 +243,7 @@ def meet_walls(
         total[:], pull[:] = 0.0, 0.0
         for m in range(1 if flat else 2):
             d = others[m]
-            periodic = codes[d, 0] == PERIODIC
+            periodic = normal[d, 0] == PERIODIC
             at = i if d == 0 else (j if d == 1 else k)
             for side in (-1, 1):
                 upper = int(side > 0)
@@ -281,7 +284,7 @@ def meet_walls(
         at = i if axis == 0 else (j if axis == 1 else k)
         for side in (-1, 1):
             to, entry = at + side, 1 + int(side > 0)
-            if codes[axis, 0] == PERIODIC:
+            if normal[axis, 0] == PERIODIC:
                 to = (to + count) % count
             elif to < 0 or to >= count:
                 continue

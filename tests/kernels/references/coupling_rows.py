@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.kernels.arrays import Array, Faces, Integers, Rows
+from flowborne.kernels.arrays import PRESCRIBED, Array, Faces, Integers, Rows
 from flowborne.kernels.coupling_rows import COVERED, ENCLOSED, NARROW, WIDE, Kinds
 
 
-def kinds_of_cells_reference(opened: Faces, walls: Integers) -> Kinds:
+def kinds_of_cells_reference(opened: Faces, normal: Integers) -> Kinds:
     """`kinds_of_cells` in NumPy."""
     slab = opened[0].shape[2] == 1
     shape = opened[1].shape[0], *opened[0].shape[1:]
@@ -17,7 +17,7 @@ def kinds_of_cells_reference(opened: Faces, walls: Integers) -> Kinds:
     for axis in range(2 if slab else 3):
         passes, layers = np.moveaxis(opened[axis].copy(), axis, 0), np.moveaxis(kind, axis, 0)
         for end in (0, -1):
-            if walls[axis, end]:
+            if normal[axis, end] == PRESCRIBED:
                 passes[end], layers[end] = 0.0, ENCLOSED
         wider = np.moveaxis(np.maximum(passes[:-1], passes[1:]), 0, axis)
         widest = np.maximum(widest, wider)

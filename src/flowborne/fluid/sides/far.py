@@ -19,6 +19,7 @@ from typing import Protocol
 from flowborne.fluid.grid import Array, Grid
 from flowborne.fluid.sides.kinds import BoundaryOpen
 from flowborne.fluid.sides.side import Boundary, Pair, Place
+from flowborne.kernels.arrays import FREE
 
 Centre = tuple[float | None, float | None, float | None]
 """Along each axis the part of the way from the lower to the upper side; None along one on which the
@@ -145,7 +146,7 @@ def in_channel(centre: Centre) -> bool:
 
 
 def _between(low: type[Boundary] | Boundary, high: type[Boundary] | Boundary) -> float | None:
-    ends = low.free + low.endless, high.free + high.endless
+    ends = (low.normal == FREE) + low.endless, (high.normal == FREE) + high.endless
     if ends == (0, 0):
         return None
     return 0.5 if ends[0] == ends[1] else float(ends[0] > ends[1])
