@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from flowborne.fluid.boundary import Boundaries
-from flowborne.fluid.ghosts import impose_sides, kernel_axes, packed_sides, plane
+from flowborne.fluid.ghosts import face_grid, impose_sides, packed_sides, plane
 from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.fluid.sides.kinds import (
     BoundaryClosed,
@@ -38,11 +38,10 @@ def with_ghosts(
     velocity: Faces, component: int, grid: Grid, sides: Boundaries, time: float
 ) -> Array:
     """A component with its layers of ghosts, in the order of the kernels' axes."""
-    axis, shape, _ = kernel_axes(component, grid, sides)
     inside = plane(velocity[component], grid)
     field = np.pad(inside, [(GHOSTS * (n > 1),) * 2 for n in inside.shape])
     table = packed_sides(component, grid, sides, [time], grid.zeros_faces())
-    fill_ghosts(field, table, 0, shape, axis)
+    fill_ghosts(field, table, 0, face_grid(component, grid, sides))
     return field
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.grid import Faces, Grid
 from flowborne.fluid.sides.side import tangential_change
-from flowborne.kernels.arrays import PRESCRIBED, Integers
+from flowborne.kernels.arrays import PRESCRIBED, FaceGrid
 from flowborne.kernels.carry import Sides
 
 Scalar = TypeVar("Scalar", bound=np.generic)
@@ -38,14 +38,13 @@ def planes(faces: Faces, grid: Grid) -> Faces:
     return (plane(x, grid), plane(x, grid), plane(y, grid)) if grid.is_slab else (x, y, z)
 
 
-def kernel_axes(component: int, grid: Grid, sides: Boundaries) -> tuple[int, Integers, Integers]:
-    """Of the faces across an axis, in the order of the kernels' axes: that axis, the shape of their
-    fields, and (3,) how many distinct ones there are along each periodic axis, else 0."""
+def face_grid(component: int, grid: Grid, sides: Boundaries) -> FaceGrid:
+    """The faces across an axis."""
     wraps = np.array(grid.shape, np.int64) * np.array(sides.periodic(), np.int64)
     shape = np.array(grid.face_shape(component))
     if not grid.is_slab:
-        return component, shape, wraps
-    return component + 1, np.array([1, *shape[:2]]), np.array([0, *wraps[:2]])
+        return FaceGrid(component, shape, wraps)
+    return FaceGrid(component + 1, np.array([1, *shape[:2]]), np.array([0, *wraps[:2]]))
 
 
 def impose_sides(velocity: Faces, grid: Grid, boundaries: Boundaries, time: float) -> None:

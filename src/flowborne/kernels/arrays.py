@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -60,6 +62,20 @@ rows below begin (s+1,), those rows, where its values begin (s+1,), and the bloc
 MobilityArrays = tuple[Array, Indices, Indices, Array, Array, Blocks, Integers, Array]
 """Dense A^-1; rows of T (start, column, value); values of L and its blocks; the order P; Y (see
 `solvers.mobility`)."""
+
+
+class FaceGrid(NamedTuple):
+    """The faces across one axis, and their control volumes, in the order of the kernels' axes.
+
+    component  that axis
+    shape      (3,) of fields on them
+    wraps      (3,) how many distinct ones there are along each periodic axis, else 0
+    """
+
+    component: int
+    shape: Integers
+    wraps: Integers
+
 
 Point = tuple[float, float, float]
 """In kernels; a row of an array serves as well."""

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit, prange
 
-from flowborne.kernels.arrays import PERIODIC, PRESCRIBED, Array, Faces, Integers, Marks
+from flowborne.kernels.arrays import PERIODIC, PRESCRIBED, Array, FaceGrid, Faces, Integers, Marks
 from flowborne.kernels.faces import mean_row
 from flowborne.kernels.jit import inlined, kernel
 
@@ -104,13 +104,7 @@ def place_of(listed: Integers, f: int, near: int) -> int:
 
 @njit(nogil=True, cache=True)
 def find_targets(
-    small: Integers,
-    kinds: Marks,
-    opened: Array,
-    volumes: Array,
-    cells: Array,
-    component: int,
-    wraps: Integers,
+    small: Integers, kinds: Marks, opened: Array, volumes: Array, cells: Array, faces: FaceGrid
 ) -> tuple[Integers, Array]:
     """Targets (n, 2) of every small one, and which parts (n, 2) of it go with them; the small one
     itself where there is none.
@@ -127,7 +121,7 @@ def find_targets(
     cells    volume of each cell
     """
     targets, parts = np.empty((small.size, 2), np.int64), np.zeros((small.size, 2))
-    shape, cell_shape = np.array(opened.shape), np.array(cells.shape)
+    (component, shape, wraps), cell_shape = faces, np.array(cells.shape)
     volume_flat = volumes.reshape(-1)
     open_flat, cell_flat, pushed = opened.reshape(-1), cells.reshape(-1), kinds.reshape(-1)
     for n in range(small.size):
@@ -220,7 +214,7 @@ def join_small(
 
 @njit(nogil=True, cache=True)
 def fill_empty(
-    field: Array, volumes: Array, listed: Integers, nothing: float, shape: Integers, wraps: Integers
+    field: Array, volumes: Array, listed: Integers, nothing: float, faces: FaceGrid
 ) -> None:
     """Give listed control volumes that hold nothing the mean of those beside them, in place."""
     flat, volume = field.reshape(-1), volumes.reshape(-1)
@@ -230,7 +224,7 @@ def fill_empty(
             continue
         total, weight = 0.0, 0.0
         for way in range(6):
-            to = neighbour(shape, wraps, f, way)
+            to = neighbour(faces.shape, faces.wraps, f, way)
             if to >= 0 and volume[to] > nothing:
                 total += volume[to] * flat[to]
                 weight += volume[to]
@@ -246,8 +240,7 @@ def level(
     leaving: Array,
     nought: Array,
     nothing: float,
-    shape: Integers,
-    wraps: Integers,
+    faces: FaceGrid,
 ) -> None:
     """Mix listed control volumes with the largest one beside them, in place, where far more leaves
     them than they hold.
@@ -270,7 +263,7 @@ def level(
             continue
         best, largest = -1, own
         for way in range(6):
-            to = neighbour(shape, wraps, f, way)
+            to = neighbour(faces.shape, faces.wraps, f, way)
             if to >= 0 and volume[to] > largest:
                 best, largest = to, volume[to]
         if best >= 0:

@@ -6,6 +6,8 @@ layer thick along its first axis, which nothing moves along.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import prange
 
@@ -25,6 +27,58 @@ order, or what is upstream."""
 
 PLANES = 8
 """Planes that one thread goes through at a time: what leaves one comes into the next."""
+
+
+class Fluxes(NamedTuple):
+    """What flows through the sides of the control volumes of one component.
+
+    through    volume per time through the faces of the cells across each axis
+    component  axis of the kernel
+    place      (2, n + 1, 2) of which two faces' fluxes those through the sides are means: across
+               other axes, and across the component's own
+    share      (2, n + 1, 2) how much of each
+    """
+
+    through: Faces
+    component: int
+    place: Integers
+    share: Array
+
+
+class Stage(NamedTuple):
+    """A stage of a step: (before start - dt net) / after in each control volume.
+
+    later    the component after it; where the volume is not above `nothing`, what is left of the
+             amount in place of the value
+    net      net amount that leaves each control volume per time: given by a stage of weight 1,
+             taken with 1 - `weight` by one of less
+    volume   after it
+    weight   of what leaves in it
+    dt       s
+    nothing  volume up to which a control volume holds nothing
+    """
+
+    later: Array
+    net: Array
+    volume: Array
+    weight: float
+    dt: float
+    nothing: float
+
+
+class Padded(NamedTuple):
+    """The component that is carried along with its ghosts, and which values may be used: CUT, CLEAR
+    or UPSTREAM."""
+
+    values: Array
+    marks: Marks
+
+
+@inlined
+def in_line(now: Stage) -> Stage:
+    """The same with flat arrays."""
+    later, net, volume = now.later.reshape(-1), now.net.reshape(-1), now.volume.reshape(-1)
+    return Stage(later, net, volume, now.weight, now.dt, now.nothing)
 
 
 @inlined
@@ -110,41 +164,18 @@ def side_row(
 
 
 @kernel
-def stage(
-    out: Array,
-    net: Array,
-    weight: float,
-    start: Array,
-    before: Array,
-    after: Array,
-    dt: float,
-    nothing: float,
-    field: Array,
-    marks: Marks,
-    q: Faces,
-    component: int,
-    place: Integers,
-    share: Array,
-) -> None:
-    """A component after a stage: (before start - dt net) / after in each of its control volumes.
+def stage(now: Stage, start: Array, before: Array, padded: Padded, flux: Fluxes) -> None:
+    """A component after a stage.
 
-    out            (n0, n1, n2); where the volume after is not above `nothing`, what is left of the
-                   amount is given in place of the value
-    net            net amount that leaves each control volume per time: given by a stage of weight
-                   1, taken with 1 - `weight` by one of less
-    start          the component at the start
-    before, after  volumes at both ends
-    field          the component that is carried along, padded
-    marks          padded: CUT, CLEAR or UPSTREAM
-    q              volume per time through the faces of the cells across each axis
-    place, share   (2, n + 1, 2) of which two faces' fluxes those through the sides are means, and
-                   how much of each: across other axes, and across the component's own
+    start, before  the component and the volumes at the start
     """
+    q, component, place, share = flux
     qx, qy, qz = q[0].reshape(-1), q[1].reshape(-1), q[2].reshape(-1)
+    out, weight, dt, nothing = now.later, now.weight, now.dt, now.nothing
     n0, n1, n2 = np.uintp(out.shape[0]), np.uintp(out.shape[1]), np.uintp(out.shape[2])
-    values, mark = field.reshape(-1), marks.reshape(-1)
-    later, leaving = out.reshape(-1), net.reshape(-1)
-    first, low, high = start.reshape(-1), before.reshape(-1), after.reshape(-1)
+    field, values, mark = padded.values, padded.values.reshape(-1), padded.marks.reshape(-1)
+    later, leaving, high = out.reshape(-1), now.net.reshape(-1), now.volume.reshape(-1)
+    first, low = start.reshape(-1), before.reshape(-1)
     zero, one, deep = np.uintp(0), np.uintp(1), np.uintp(GHOSTS)
     room = field.shape[0] > out.shape[0]
     p = deep if room else zero
