@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from flowborne.kernels.arrays import Nodes
+from flowborne.kernels.closed_fractions import ClosedByBody
 from flowborne.kernels.edge_crossings import Crossings, new_crossings
 
 SHAPES = [(9, 8, 7), (10, 9, 1)]
@@ -41,6 +43,11 @@ class Cut:
     def own_crossings(self) -> Crossings:
         """The same with the first ball."""
         return new_crossings(self.phi, H, self.flat)
+
+    def closed_by_body(self, share: np.ndarray, centre: np.ndarray) -> ClosedByBody:
+        """What the first ball, number 7, closes of the faces across every axis."""
+        nodes = Nodes(ORIGIN, H, self.flat)
+        return ClosedByBody(7, self.box, nodes, (share,) * 3, (centre,) * 3)
 
 
 def nodes(shape: tuple[int, int, int]) -> np.ndarray:

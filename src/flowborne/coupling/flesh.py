@@ -16,7 +16,7 @@ from flowborne.coupling.shapes import WATERTIGHT
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.grid import Array, Grid
 from flowborne.kernels.arrays import Integers
-from flowborne.kernels.edge_crossings import Crossings, new_crossings
+from flowborne.kernels.edge_crossings import PIECES, Crossings, new_crossings
 from flowborne.kernels.node_distance import BAND
 from flowborne.kernels.skin import cross_skin, sample_skin, skin_box, skin_weights
 from flowborne.solids.flesh import Flesh
@@ -61,24 +61,20 @@ def skins_on(grid: Grid, sides: Boundaries, flesh: Flesh | None, vertices: Array
         low, high = inside.min(axis=0), inside.max(axis=0)
         middles.append(0.5 * (low + high))
         for image in displaced(grid, sides, low, high):
-            origin = np.array(image.origin)
-            box = skin_box(inside, origin, grid.spacing, np.array(grid.shape))
+            box = skin_box(inside, image.nodes, np.array(grid.shape))
             if grid.is_slab:
                 box[2] = 0, 2
             if np.any(box[:, 1] - box[:, 0] < 2):
                 box[:] = 0
-            phi = sample_skin(vertices, triangles, box, origin, grid.spacing, grid.is_slab, BAND)
+            phi = sample_skin(vertices, triangles, box, image.nodes, BAND)
             fleshes.append(f)
             boxes.append(box)
             starts.append(first)
             more = max(0.0, 0.5 * (thinnest - flesh.thickness[f]))
             found = new_crossings(phi, grid.spacing, grid.is_slab)
             if more == 0.0:
-                skin = vertices, triangles, flesh.sheets[own], -1 - f
-                cross_skin(
-                    found, np.zeros(1, np.int64), phi, *skin, box, origin, grid.spacing,
-                    grid.is_slab,
-                )  # fmt: skip
+                skin = vertices, triangles, (-1 - f) * PIECES + flesh.sheets[own]
+                cross_skin(found, np.zeros(1, np.int64), phi, *skin, box, image.nodes)
             crossings.append(found)
             distances.append(phi.ravel() - more)
             first += phi.size

@@ -16,6 +16,8 @@ from flowborne.fluid.ghosts import edge
 from flowborne.fluid.grid import Array, Faces, Grid, faces_of
 from flowborne.kernels.arrays import PRESCRIBED, Integers, Mask, Rows
 from flowborne.kernels.closed_fractions import (
+    ClosedByBody,
+    ClosedList,
     close_faces,
     count_beside,
     list_closed,
@@ -32,6 +34,7 @@ from flowborne.kernels.coupling_rows import (
 )
 from flowborne.kernels.cut_faces import other_axes
 from flowborne.kernels.edge_crossings import (
+    PIECES,
     Crossings,
     Placed,
     cross_geometry,
@@ -129,8 +132,7 @@ def around_bodies(
     for body in np.unique(shapes.body):
         geoms = np.flatnonzero(shapes.body == body)
         for image in displaced(grid, boundaries, *boxes[body]):
-            origin = np.array(image.origin)
-            box = node_box(geoms, position, rotation, shapes.reach, origin, grid.spacing, shape)
+            box = node_box(geoms, position, rotation, shapes.reach, image.nodes, shape)
             if grid.is_slab:
                 box[2] = 0, 2
             if np.all(box[:, 1] - box[:, 0] >= 2):
@@ -153,12 +155,13 @@ def piece_of_body(
     for g in skinned:
         np.minimum(phi, skin_distance(shapes, placed, g, box, grid), out=phi)
     found = new_crossings(phi, grid.spacing, grid.is_slab)
-    used, on = np.zeros(1, np.int64), (np.array(grid.origin), grid.spacing, grid.is_slab)
+    used = np.zeros(1, np.int64)
     for g in plain:
-        cross_geometry(found, used, phi, box, placed[g], int(g), *on)
+        cross_geometry(found, used, phi, box, placed[g], int(g), grid.nodes)
     for g in skinned:
-        skin = at_place(shapes, placed, g), shapes.skins[g][1], shapes.pieces[g], int(g)
-        cross_skin(found, used, phi, *skin, box, *on)
+        pieces = int(g) * PIECES + shapes.pieces[g]
+        skin = at_place(shapes, placed, g), shapes.skins[g][1], pieces
+        cross_skin(found, used, phi, *skin, box, grid.nodes)
     return Piece(body, grid, box, phi, found)
 
 
@@ -182,7 +185,7 @@ def sampled(placed: list[Placed], geoms: Integers, box: Integers, grid: Grid) ->
     """(box shape) distance to the nearest of some geometries at the nodes of a box, m."""
     phi = np.full(box[:, 1] - box[:, 0], BAND * grid.spacing)
     for g in geoms:
-        lower_to_body(phi, box, placed[g], np.array(grid.origin), grid.spacing, grid.is_slab)
+        lower_to_body(phi, box, placed[g], grid.nodes)
     return phi
 
 
@@ -201,7 +204,7 @@ def skin_distance(
     """
     vertices, faces = at_place(shapes, placed, geom), shapes.skins[geom][1]
     band, h = BAND if grid.is_slab else NEAR, grid.spacing
-    near = sample_skin(vertices, faces, box, np.array(grid.origin), h, grid.is_slab, band)
+    near = sample_skin(vertices, faces, box, grid.nodes, band)
     if grid.is_slab:
         return near
     far = sampled(placed, np.array([geom]), box, grid)
@@ -252,37 +255,33 @@ def geometry(
         sizes = [inside + (np.arange(3) == d) for d in range(3)]
         share = faces_of([np.zeros(size) for size in sizes])
         middle = faces_of([np.zeros((2, *size)) for size in sizes])
-        own.append((piece, share, middle))
+        own.append(ClosedByBody(piece.body, piece.box, piece.grid.nodes, share, middle))
         for d in grid.axes:
-            faces = share[d], middle[d], total[d]
-            close_faces(*faces, piece.distance, piece.crossings, piece.box, d, flat)
+            close_faces(own[-1], total[d], piece.distance, piece.crossings, d)
     parts = 0
-    for piece, share, middle in own:
+    for each in own:
         for d in grid.axes:
-            parts += share_closed(
-                share[d], middle[d], opened[d], total[d], distance, crossings, beside, piece.box, d,
-                normal[d], flat,
-            )  # fmt: skip
+            faces = opened[d], total[d], distance, crossings, beside
+            parts += share_closed(each, *faces, d, normal[d])
     for d in around:
         join_ends(opened[d], d)
-    axis, face, part_body = (np.empty(parts, np.int64) for _ in range(3))
-    closed, centre, last = np.empty(parts), np.empty((parts, 2)), 0
-    for piece, share, middle in own:
+    numbers = (np.empty(parts, np.int64) for _ in range(3))
+    listed, last = ClosedList(*numbers, np.empty(parts), np.empty((parts, 2))), 0
+    for each in own:
         for d in grid.axes:
-            counts = np.array(grid.face_shape(d))
-            into = axis, face, part_body, closed, centre
-            last = list_closed(share[d], middle[d], piece.box, d, piece.body, counts, last, *into)
+            last = list_closed(each, d, np.array(grid.face_shape(d)), last, listed)
+    axis, face, part_body, closed, centre = listed
     kind = kinds_of_cells(ox, oy, oz, normal)
     with_rows = kind >= NARROW
-    bones = [each for each in own if each[0].body < first_skin]
+    bones = [each for each in own if each.body < first_skin]
     middles = np.concatenate([boxes.mean(axis=1), skins.middle])
     images = Images(periods(grid, boundaries), middles)
     place, index = face_centres(axis, face, grid)
     first = int(np.searchsorted(part_body, first_skin)) if len(skins.start) else parts
     place[np.arange(first)[:, None], OTHER_AXES[axis[:first]]] += h * centre[:first]
     place = images.at_bodies(place, part_body)
-    rows = bone_rows(bones, with_rows, grid)
-    common = bone_rows([] if boundaries.has_free_side(grid) else bones, kind == COVERED, grid)
+    rows = bone_rows(bones, with_rows)
+    common = bone_rows([] if boundaries.has_free_side(grid) else bones, kind == COVERED)
     if flat:
         oz[:] = 0.0
     volume = np.ones(grid.shape)
@@ -310,30 +309,22 @@ def geometry(
         owner = np.append(owner, np.full(lent[0].size, -1))
         force = np.concatenate([force, np.zeros((lent[0].size, 3))])
         rows = joined(rows, lent)
-    listed = ClosedParts(axis, face, part_body, closed, place, corner, weight)
+    closed_parts = ClosedParts(*listed[:4], place, corner, weight)
     cut = distance, nearest, crossings, (ox, oy, oz), volume
-    return Geometry(*cut, listed, rows, owner, force, skins, images)
+    return Geometry(*cut, closed_parts, rows, owner, force, skins, images)
 
 
-def bone_rows(bones: list[tuple[Piece, Faces, Faces]], listed: Mask, grid: Grid) -> Rows:
-    """Rows of J of bones in listed cells.
-
-    bones   and what each closes of the faces in its box, and where, see `list_cells`
-    listed  (nx, ny, nz)
-    """
-    none, counts, size = np.zeros(0, np.int64), [0], (grid.spacing, grid.face_area, grid.is_slab)
-    given = [
-        (share, centre, listed, piece.box, piece.body, np.array(piece.grid.origin), *size)
-        for piece, share, centre in bones
-    ]
-    for bone in given:
-        counts.append(list_cells(*bone, counts[-1], none, none, np.zeros(0)))
+def bone_rows(bones: list[ClosedByBody], listed: Mask) -> Rows:
+    """Rows of J of bones in listed cells (nx, ny, nz)."""
+    none, counts = np.zeros(0, np.int64), [0]
+    for bone in bones:
+        counts.append(list_cells(bone, listed, counts[-1], none, none, np.zeros(0)))
     rows = counts[-1]
     cells, columns = np.empty(rows, np.int64), np.empty(6 * rows, np.int64)
     values = np.empty(6 * rows)
-    for bone, at in zip(given, counts[:-1], strict=True):
+    for bone, at in zip(bones, counts[:-1], strict=True):
         if rows:
-            list_cells(*bone, at, cells, columns, values)
+            list_cells(bone, listed, at, cells, columns, values)
     return cells, 6 * np.arange(rows + 1, dtype=np.int64), columns, values
 
 

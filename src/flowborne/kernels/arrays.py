@@ -64,6 +64,19 @@ MobilityArrays = tuple[Array, Indices, Indices, Array, Array, Blocks, Integers, 
 `solvers.mobility`)."""
 
 
+class Nodes(NamedTuple):
+    """Where the nodes of the grid are: (i, j, k) at origin + spacing (i, j, k).
+
+    origin   (3,) m
+    spacing  m
+    flat     whether it is a slab, whose nodes lie at z = 0
+    """
+
+    origin: Array
+    spacing: float
+    flat: bool
+
+
 class FaceGrid(NamedTuple):
     """The faces across one axis, and their control volumes, in the order of the kernels' axes.
 

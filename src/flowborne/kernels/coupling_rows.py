@@ -9,7 +9,8 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
-from flowborne.kernels.arrays import PRESCRIBED, Array, Faces, Integers, Rows
+from flowborne.kernels.arrays import PRESCRIBED, Array, Integers, Rows
+from flowborne.kernels.closed_fractions import ClosedByBody
 from flowborne.kernels.jit import inlined, kernel
 
 Kinds = NDArray[np.int8]
@@ -76,23 +77,12 @@ def kinds_of_cells(ox: Array, oy: Array, oz: Array, normal: Integers) -> Kinds:
 
 
 @njit(nogil=True, cache=True)
-def cell_wrench(
-    wrench: Array,
-    i: int,
-    j: int,
-    k: int,
-    share: Faces,
-    centre: Faces,
-    box: Integers,
-    origin: Array,
-    h: float,
-    area: float,
-    flat: bool,
-) -> None:
-    """Wrench of unit pressure in cell (i, j, k) on the body whose shares are given: what acts on
-    a closed part of a face acts at its centre."""
+def cell_wrench(wrench: Array, i: int, j: int, k: int, parts: ClosedByBody) -> None:
+    """Wrench of unit pressure in cell (i, j, k) on the body: what acts on a closed part of a face
+    acts at its centre."""
+    _, box, (origin, h, flat), (sx, sy, sz), (cx, cy, cz) = parts
+    area = h if flat else h * h
     a, b, c = i - box[0, 0], j - box[1, 0], k - box[2, 0]
-    (sx, sy, sz), (cx, cy, cz) = share, centre
     x, y = origin[0] + h * (i + 0.5), origin[1] + h * (j + 0.5)
     z = 0.0 if flat else origin[2] + h * (k + 0.5)
     wrench[:] = 0.0
@@ -115,15 +105,8 @@ def cell_wrench(
 
 @njit(nogil=True, cache=True)
 def list_cells(
-    share: Faces,
-    centre: Faces,
+    parts: ClosedByBody,
     listed: NDArray[np.bool_],
-    box: Integers,
-    body: int,
-    origin: Array,
-    h: float,
-    area: float,
-    flat: bool,
     at: int,
     cells: Integers,
     columns: Integers,
@@ -133,11 +116,9 @@ def list_cells(
 
     With `cells` of length 0 it only counts. Where the body closes as much on either side of a cell,
     at the same place, it has no row.
-
-    share   what the body closes of each face in its box
-    centre  (2, ...) of what is closed, see `close_faces`
     """
-    wrench, (sx, sy, sz) = np.empty(6), share
+    body, box, (_, _, flat), (sx, sy, sz), _ = parts
+    wrench = np.empty(6)
     n = listed.shape
     for i in range(box[0, 0], box[0, 1] - 1):
         for j in range(box[1, 0], box[1, 1] - 1):
@@ -148,7 +129,7 @@ def list_cells(
                     closed += sz[a, b, c] + sz[a, b, c + 1]
                 if closed == 0.0 or not listed[i, j, k]:
                     continue
-                cell_wrench(wrench, i, j, k, share, centre, box, origin, h, area, flat)
+                cell_wrench(wrench, i, j, k, parts)
                 if wrench.any():
                     if cells.size:
                         cells[at] = (i * n[1] + j) * n[2] + k

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from flowborne.kernels.arrays import Nodes
 from flowborne.kernels.distance import MESH
 from flowborne.kernels.node_distance import BAND
 from flowborne.kernels.skin import sample_skin
@@ -95,7 +96,8 @@ class ShapeMesh(Shape):
         """Spaced as the nodes of the grid; near the surface they are not used."""
         corner, counts = lattice(self.reach, spacing, BAND * spacing)
         box = np.stack([np.zeros_like(counts), counts], axis=1)
-        found = sample_skin(self.vertices, self.faces, box, corner, spacing, False, BAND)
+        nodes = Nodes(corner, spacing, flat=False)
+        found = sample_skin(self.vertices, self.faces, box, nodes, BAND)
         return Samples(corner, spacing, found)
 
     def skin(self) -> Mesh | None:

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flowborne.kernels.arrays import PRESCRIBED, Array, Faces, Integers, Rows
+from flowborne.kernels.closed_fractions import ClosedByBody
 from flowborne.kernels.coupling_rows import COVERED, ENCLOSED, NARROW, WIDE, Kinds
 
 
@@ -27,18 +28,12 @@ def kinds_of_cells_reference(opened: Faces, normal: Integers) -> Kinds:
 
 
 def list_cells_reference(
-    share: Faces,
-    centre: Faces,
-    listed: NDArray[np.bool_],
-    box: Integers,
-    body: int,
-    origin: Array,
-    h: float,
-    area: float,
-    flat: bool,
+    parts: ClosedByBody, listed: NDArray[np.bool_]
 ) -> tuple[Integers, Integers, Array]:
     """`list_cells` in NumPy: cells (m,), columns (6m,) and values (6m,)."""
+    body, box, (origin, h, flat), share, centre = parts
     inside = tuple(slice(low, high - 1) for low, high in box)
+    area = h if flat else h**2
     cell = np.moveaxis(np.indices(listed.shape)[(slice(None), *inside)], 0, -1)
     wrench = np.zeros((*cell.shape[:3], 6))
     for axis in range(2 if flat else 3):
