@@ -14,6 +14,7 @@ from flowborne.kernels.viscosity import (
     INACTIVE,
     TIED,
     UNKNOWN,
+    CutFaces,
     apply_component,
     classify,
     face_distances,
@@ -88,8 +89,8 @@ def test_links(shape: tuple, normal: np.ndarray, axis: int) -> None:
         grid = made.distance, made.opened[axis], centre, parts
         edges = made.distance, made.crossings
         found = [np.zeros(kind.shape) for _ in range(3)]
-        near = np.full(kind.shape, -1.0)
-        link_faces(axis, d, kind, near, *edges, *grid[1:], velocity, 0.7, *found, periodic)
+        near, faces = np.full(kind.shape, -1.0), CutFaces(axis, kind, *edges, *grid[1:], 0.7)
+        link_faces(faces, d, near, velocity, *found, periodic)
         expected = link_faces_reference(axis, d, kind, *grid, velocity, 0.7, periodic)
         for one, other in zip(found, expected, strict=True):
             assert other.any()
@@ -103,7 +104,8 @@ def test_links_of_uncut_faces_need_no_geometry() -> None:
     cuts = nothing, np.full((2, 6, 4, 3), np.nan), np.full(shape, np.nan)
     for d in range(3):
         diagonal, link, given = (np.zeros(kind.shape) for _ in range(3))
-        link_faces(0, d, kind, away, *edges, *cuts, away, 0.7, diagonal, link, given, False)
+        faces = CutFaces(0, kind, *edges, *cuts, 0.7)
+        link_faces(faces, d, away, away, diagonal, link, given, False)
         assert set(np.unique(link)) == {0.0, 0.7}
         np.testing.assert_array_equal(np.moveaxis(link, d, 0)[:-1], 0.7)
 
@@ -113,10 +115,8 @@ def test_walls(shape: tuple, normal: np.ndarray, axis: int) -> None:
     made, centre, parts, kind = kinds(shape, normal, axis)
     beside = np.flatnonzero(kind == UNKNOWN)
     grid = made.distance, made.opened[axis], centre, parts
-    wall, node = np.zeros((beside.size, 3)), np.zeros((beside.size, 3), np.int64)
-    gap, place = np.zeros((2, beside.size, 3, 3))
-    edges = made.distance, made.crossings
-    meet_walls(axis, kind, *edges, *grid[1:], 0.7, normal, beside, wall, gap, place, node)
+    faces = CutFaces(axis, kind, made.distance, made.crossings, *grid[1:], 0.7)
+    wall, gap, place, node = meet_walls(faces, normal, beside)
     expected = meet_walls_reference(axis, kind, *grid, 0.7, normal, beside)
     assert (np.abs(wall) > 0.0).any(axis=0).all()
     np.testing.assert_allclose(wall, expected[0], rtol=1e-9, atol=1e-13)

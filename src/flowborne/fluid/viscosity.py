@@ -39,6 +39,7 @@ from flowborne.kernels.edge_crossings import Crossings
 from flowborne.kernels.viscosity import (
     INACTIVE,
     UNKNOWN,
+    CutFaces,
     classify,
     face_distances,
     find_centres,
@@ -152,19 +153,15 @@ def assemble_viscosity(
         mass[(friction > 0.0) & (kind == UNKNOWN)] *= SIDE_MASS
         diagonal = np.where(kind == UNKNOWN, mass + friction, 0.0)
         links = np.zeros((3, *shape))
-        around = away, *edges, opened, centre, parts, velocity[axis], stiffness, diagonal
+        faces = CutFaces(axis, kind, *edges, opened, centre, parts, stiffness)
         for d in grid.axes:
-            link_faces(axis, d, kind, *around, links[d], given, periodic[d])
+            around = away, velocity[axis], diagonal, links[d], given
+            link_faces(faces, d, *around, periodic[d])
         beside = near[kind.reshape(-1)[near] == UNKNOWN]
-        wall, node = np.zeros((beside.size, 3)), np.zeros((beside.size, 3), np.int64)
-        gap, place = np.zeros((beside.size, 3, 3)), np.zeros((beside.size, 3, 3))
-        meet_walls(
-            axis, kind, *edges, opened, centre, parts, stiffness, normal, beside,
-            wall, gap, place, node,
-        )  # fmt: skip
+        wall, gap, place, node = meet_walls(faces, normal, beside)
         diagonal.reshape(-1)[beside] += wall.sum(axis=1)
-        walls = opened, parts, links, beside, wall[:, 0], stiffness, wraps, cut.distance
-        corners = Corners(*corner_stiffness(axis, *found, kind, *walls))
+        walls = links, beside, wall[:, 0], wraps
+        corners = Corners(*corner_stiffness(faces, *found, *walls))
         np.add.at(diagonal.reshape(-1), corners.faces, np.einsum("nii->ni", corners.matrix))
         met = wall != 0.0
         beside = np.repeat(beside, met.sum(axis=1))
