@@ -84,18 +84,15 @@ def in_line(now: Stage) -> Stage:
 @inlined
 def line_flux(
     out: Array,
-    first: int,
-    end: int,
+    span: tuple[int, int],
     q: Array,
-    one: int,
-    other: int,
+    rows: tuple[int, int],
     share: Array,
     field: Array,
     marks: Marks,
-    at: int,
-    step: int,
+    across: tuple[int, int],
 ) -> None:
-    """Flux x value at a row of sides, from `first` to `end`, all arrays flat.
+    """Flux x value at a row of sides, from the first to the end of `span`, all arrays flat.
 
     What flows through each side is the mean of what flows through the faces of two cells. The
     upwind value of third order (Leonard 1979) lies between both neighbours, but for smooth extrema,
@@ -103,12 +100,12 @@ def line_flux(
     where one is UPSTREAM, else the mean of both. Written without branches and views, and with
     unsigned places, so that it vectorises.
 
-    one, other  where in q the rows of faces begin; share (2,) how much of each
-    at, step    where the row above the sides begins in the padded field, and what is between
-                neighbours across them
+    rows    where in q the two rows of faces begin; share (2,) how much of each
+    across  where the row above the sides begins in the padded field, and what is between neighbours
+            across them
     """
-    s, t = share[0], share[1]
-    for k in range(first, end):
+    (one, other), (at, step), s, t = rows, across, share[0], share[1]
+    for k in range(span[0], span[1]):
         g = s * q[one + k] + t * q[other + k]
         n = at + k
         low, high = field[n - step], field[n]
@@ -138,8 +135,7 @@ def side_row(
     share: Array,
     field: Array,
     marks: Marks,
-    at: int,
-    step: int,
+    across: tuple[int, int],
 ) -> None:
     """Flux x value through `count` sides of the control volumes (i, j, :) of a component.
 
@@ -149,18 +145,19 @@ def side_row(
     n1, n2, zero, one = np.uintp(shape[1]), np.uintp(shape[2]), np.uintp(0), np.uintp(1)
     if component == 0:
         low, high = np.uintp(place[i, 0]), np.uintp(place[i, 1])
-        low, high = (low * n1 + j) * n2, (high * n1 + j) * n2
-        line_flux(out, zero, count, q, low, high, share[i], field, marks, at, step)
+        rows = (low * n1 + j) * n2, (high * n1 + j) * n2
+        line_flux(out, (zero, count), q, rows, share[i], field, marks, across)
     elif component == 1:
         low, high = np.uintp(place[j, 0]), np.uintp(place[j, 1])
-        low, high = (i * n1 + low) * n2, (i * n1 + high) * n2
-        line_flux(out, zero, count, q, low, high, share[j], field, marks, at, step)
+        rows = (i * n1 + low) * n2, (i * n1 + high) * n2
+        line_flux(out, (zero, count), q, rows, share[j], field, marks, across)
     else:
         row = (i * n1 + j) * n2
-        line_flux(out, one, count - one, q, row - one, row, share[1], field, marks, at, step)
+        rows = row - one, row
+        line_flux(out, (one, count - one), q, rows, share[1], field, marks, across)
         for k in (zero, count - one):
-            low, high = row + np.uintp(place[k, 0]) - k, row + np.uintp(place[k, 1]) - k
-            line_flux(out, k, k + one, q, low, high, share[k], field, marks, at, step)
+            rows = row + np.uintp(place[k, 0]) - k, row + np.uintp(place[k, 1]) - k
+            line_flux(out, (k, k + one), q, rows, share[k], field, marks, across)
 
 
 @kernel
@@ -193,8 +190,8 @@ def stage(now: Stage, start: Array, before: Array, padded: Padded, flux: Fluxes)
             for j in range(n1 + one):
                 at = ((i + p) * rows + j + deep) * wide + deep
                 side_row(
-                    row, n2, qy, q[1].shape, i, j, component, y_place, y_share, values, mark, at,
-                    wide,
+                    row, n2, qy, q[1].shape, i, j, component, y_place, y_share, values, mark,
+                    (at, wide),
                 )  # fmt: skip
                 if j > zero:
                     n = (i * n1 + j - one) * n2
@@ -214,7 +211,7 @@ def stage(now: Stage, start: Array, before: Array, padded: Padded, flux: Fluxes)
                     break
                 side_row(
                     side, n2 + one, qz, q[2].shape, i, j, component, z_place, z_share, values,
-                    mark, at, one,
+                    mark, (at, one),
                 )  # fmt: skip
                 for k in range(n2):
                     sums[k] = side[k + one] - side[k] - row[k]
@@ -224,13 +221,13 @@ def stage(now: Stage, start: Array, before: Array, padded: Padded, flux: Fluxes)
                 if i == bottom:
                     side_row(
                         row, n2, qx, q[0].shape, i, j, component, x_place, x_share, values, mark,
-                        at, rows * wide,
+                        (at, rows * wide),
                     )  # fmt: skip
                     for k in range(n2):
                         below[n + k] = row[k]
                 side_row(
                     row, n2, qx, q[0].shape, i + one, j, component, x_place, x_share, values, mark,
-                    at + rows * wide, rows * wide,
+                    (at + rows * wide, rows * wide),
                 )  # fmt: skip
                 for k in range(n2):
                     sums[k] += row[k] - below[n + k]

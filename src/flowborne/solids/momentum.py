@@ -9,9 +9,9 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from flowborne.kernels.arrays import Array
-from flowborne.kernels.momentum import about_origin, momentum_impulse
+from flowborne.kernels.momentum import Momenta, about_origin, momentum_impulse
 from flowborne.solids.model import SolidModel
-from flowborne.solids.scratch import Scratch, posed, scratch
+from flowborne.solids.scratch import Scratch, posed, scratch, twists_about_origin
 from flowborne.solids.state import SolidState
 
 MOST_MOMENTA = 4
@@ -114,9 +114,7 @@ class Halfway:
     mass   (nv, nv) mass matrix, dense or sparse
     given  (bodies, 6) momentum of the subtree of each body when the positions were half-way, plus
            the impulse of gravity during the step
-    cdof   (nv, 6) for unit velocity of each dof: angular velocity of the bodies that it moves, and
-           velocity of the point at its centre
-    centre (nv, 3) m
+    twist  (nv, 6) about the world origin of the bodies that each dof moves, for its unit velocity
     """
 
     model: SolidModel
@@ -126,8 +124,7 @@ class Halfway:
     still: Array
     mass: Array | csr_array
     given: Array
-    cdof: Array
-    centre: Array
+    twist: Array
     _found: dict[bytes, tuple[Array, Array]] = field(default_factory=dict, repr=False)
 
     def impulse(self, v_plus: Array) -> tuple[Array, Array]:
@@ -148,11 +145,8 @@ class Halfway:
         mujoco.mj_rne(s.mj, s.data, 0, bias)
         gained = self.mass @ (v_plus - v) - model.armature * (v_plus - v)
         return momentum_impulse(
-            self.cdof,
-            self.centre,
-            self.given,
-            later,
-            model.dof_body,
+            self.twist,
+            Momenta(self.given, later, model.dof_body),
             model.conserved,
             gained,
             self.still,
@@ -176,6 +170,7 @@ def halfway(
 
     The arguments are those of `Halfway`.
     """
-    cdof, centre, fall = s.cdof.copy(), s.subtree_com[model.dof_root], dt * weight(model, s)
+    twist = twists_about_origin(s.cdof, s.subtree_com[model.dof_root])
+    fall = dt * weight(model, s)
     given = subtree_halfway_momentum(model, s, before, dt) + fall
-    return Halfway(model, state.copy(), dt, outer, still, mass, given, cdof, centre)
+    return Halfway(model, state.copy(), dt, outer, still, mass, given, twist)

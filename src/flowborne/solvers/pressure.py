@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flowborne.kernels.arrays import Array, DenseTerm, Faces, Indices, Integers, Real, Rows
-from flowborne.kernels.conjugate_gradients import solve
+from flowborne.kernels.conjugate_gradients import Matrix, Preconditioner, solve
 from flowborne.kernels.levels import at_level
 from flowborne.kernels.regions import region_loads
 from flowborne.kernels.sparse_rows import padded_rows
@@ -155,21 +155,10 @@ class PressureSystem:
             load_cells(x, np.ascontiguousarray(guess, np.float64).reshape(cells), diagonal)
         load_cells(right, np.ascontiguousarray(rhs, np.float64).reshape(cells), diagonal)
         added = self.deflation(term)
-        iterations, residual, converged = solve(
-            self.hierarchy,
-            b.cycle,
-            self.finest,
-            b.vectors,
-            added.rows,
-            term.mobility.arrays,
-            self.beyond,
-            b.label,
-            added.null,
-            added.fields,
-            added.amounts,
-            tolerance,
-            absolute,
-        )
+        arrays = term.mobility.arrays
+        matrix = Matrix(self.finest, added.rows, arrays, self.beyond, b.label, added.null)
+        cycle = Preconditioner(self.hierarchy, b.cycle, added.fields, added.amounts)
+        iterations, residual, converged = solve(matrix, cycle, b.vectors, tolerance, absolute)
         start = (1 if inner[0] > 1 else 0, 1, 1)
         inside = tuple(slice(s, s + n) for s, n in zip(start, cells, strict=True))
         pressure = x[inside].copy().reshape(self.shape)
