@@ -6,14 +6,7 @@ import numpy as np
 import pytest
 
 from flowborne.kernels.arrays import FREE, PERIODIC, PRESCRIBED
-from flowborne.kernels.closed_fractions import (
-    CREASE,
-    ClosedList,
-    close_faces,
-    count_beside,
-    list_closed,
-    share_closed,
-)
+from flowborne.kernels.closed_fractions import CREASE, close_faces, count_beside, share_closed
 
 from .cut_cells import SHAPES, cut, face_shape
 from .references.closed_fractions import (
@@ -34,8 +27,7 @@ def test_close_faces(shape: tuple[int, int, int], axis: int) -> None:
     expected, total = face_closed_reference(made.phi, axis), before.copy()
     assert expected.max() > 0.5
     own, centre = np.empty(expected.shape), np.zeros((2, *expected.shape))
-    parts = made.closed_by_body(own, centre)
-    close_faces(parts, total, made.phi, made.own_crossings, axis)
+    close_faces(made.piece(own, centre), total, axis)
     np.testing.assert_allclose(own, expected, atol=1e-14)
     cut_through = (expected > 0.0) & (expected < 1.0)
     assert not centre[:, ~cut_through].any()
@@ -72,12 +64,12 @@ def test_shares_and_their_list(
     opened = np.ones(total.shape)
     union = face_closed_reference(made.distance, axis)
     assert ((union > 1.0 - 10.0 * CREASE) & (union < 1.0)).any()
-    parts, faces = made.closed_by_body(share, centre), (opened, total, made.distance)
+    piece, faces = made.piece(share, centre), (opened, total, made.distance)
     expected, opening = share_closed_reference(share, *faces, beside, made.box, axis, ends)
-    count = share_closed(parts, *faces, made.crossings, beside, axis, ends)
+    found = share_closed(piece, *faces, made.crossings, beside, axis, ends)
     np.testing.assert_allclose(share, expected, atol=1e-14)
     np.testing.assert_allclose(opened, opening, atol=1e-14)
-    assert count == (expected > 0.0).sum()
+    assert len(found[0]) == (expected > 0.0).sum()
     at = faces_in(made.box, axis)
     shut = (alone > 0.0) & (opening[at] == 0.0)
     assert not centre[:, shut].any()
@@ -85,23 +77,13 @@ def test_shares_and_their_list(
     np.testing.assert_array_equal(centre[:, single], own_centre[:, single])
     both, middle = np.zeros(total.shape), np.zeros((2, *total.shape))
     everywhere = np.array([[0, n] for n in made.distance.shape])
-    whole = made.closed_by_body(both, middle)._replace(box=everywhere)
-    close_faces(whole, total.copy(), made.distance, made.crossings, axis)
+    whole = {"box": everywhere, "distance": made.distance, "crossings": made.crossings}
+    close_faces(made.piece(both, middle)._replace(**whole), total.copy(), axis)
     several = ~shut & (alone > 0.0) & (alone != total[at])
     np.testing.assert_array_equal(centre[:, several], middle[:, *at][:, several])
     assert single.any()
     assert several.any()
     assert shut.any()
-    counts = np.array(total.shape)
-    faces, closed, centres = list_closed_reference(share, centre, made.box, counts)
-    found = [np.full(count + 3, -1) for _ in range(3)]
-    parts_of, place_of = np.full(count + 3, -1.0), np.full((count + 3, 2), -1.0)
-    listed = ClosedList(*found, parts_of, place_of)
-    assert list_closed(parts, axis, counts, 2, listed) == count + 2
-    inner = slice(2, count + 2)
-    np.testing.assert_array_equal(found[0][inner], axis)
-    np.testing.assert_array_equal(found[1][inner], faces)
-    np.testing.assert_array_equal(found[2][inner], parts.body)
-    np.testing.assert_array_equal(parts_of[inner], closed)
-    np.testing.assert_array_equal(place_of[inner], centres)
-    assert (np.delete(parts_of, inner) == -1.0).all()
+    listed = list_closed_reference(share, centre, made.box, np.array(total.shape))
+    for one, other in zip(found, listed, strict=True):
+        np.testing.assert_array_equal(one, other)

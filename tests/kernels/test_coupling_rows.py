@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flowborne.kernels.arrays import FREE, PRESCRIBED, Nodes
-from flowborne.kernels.closed_fractions import ClosedByBody
+from flowborne.kernels.arrays import FREE, PRESCRIBED
 from flowborne.kernels.coupling_rows import (
     COVERED,
     ENCLOSED,
@@ -56,14 +55,10 @@ def test_list_cells(shape: tuple[int, int, int]) -> None:
     centre = tuple(random.uniform(-0.5, 0.5, (2, *values.shape)) for values in share)
     for values in centre if made.flat else ():
         values[1] = 0.0
-    parts = ClosedByBody(5, made.box, Nodes(ORIGIN, H, made.flat), share, centre)
+    piece = made.piece(share[0], centre[0])._replace(share=share, centre=centre)
     listed = random.random(shape) < 0.5
-    expected = list_cells_reference(parts, listed)
-    none, nothing = np.zeros(0, np.int64), np.zeros(0)
-    count = list_cells(parts, listed, 0, none, none, nothing)
-    assert 0 < count == expected[0].size < inside.prod()
-    found = np.empty(count, np.int64), np.empty(6 * count, np.int64), np.empty(6 * count)
-    assert list_cells(parts, listed, 0, *found) == count
+    expected, found = list_cells_reference(piece, listed), list_cells(piece, listed)
+    assert 0 < found[0].size == expected[0].size < inside.prod()
     for one, other in zip(found, expected, strict=True):
         np.testing.assert_allclose(one, other, atol=1e-14)
 

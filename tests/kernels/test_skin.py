@@ -10,7 +10,7 @@ import pyvista as pv
 
 from flowborne.fluid.grid import Array, Grid
 from flowborne.kernels.arrays import Integers
-from flowborne.kernels.closed_fractions import ClosedByBody, close_faces
+from flowborne.kernels.closed_fractions import Piece, close_faces
 from flowborne.kernels.cut_faces import nodes_inside
 from flowborne.kernels.edge_crossings import new_crossings
 from flowborne.kernels.node_distance import BAND
@@ -313,8 +313,8 @@ def test_closed_area_of_a_sphere_is_second_order(axis: int) -> None:
             total = np.zeros(grid.face_shape(axis))
             own = np.empty(np.array(phi.shape) - 1 + (np.arange(3) == axis))
             crossings, centre = new_crossings(phi, grid.spacing, False), np.zeros((2, *own.shape))
-            parts = ClosedByBody(0, box, grid.nodes, (own,) * 3, (centre,) * 3)
-            close_faces(parts, total, phi, crossings, axis)
+            piece = Piece(0, box, grid.nodes, phi, crossings, (own,) * 3, (centre,) * 3)
+            close_faces(piece, total, axis)
             place = grid.face_coordinates(axis)[axis]
             middle = int(np.argmin(np.abs(place)))
             area = h**2 * np.take(total, middle, axis).sum()

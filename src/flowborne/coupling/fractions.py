@@ -16,11 +16,9 @@ from flowborne.fluid.ghosts import edge
 from flowborne.fluid.grid import Array, Faces, Grid, faces_of
 from flowborne.kernels.arrays import PRESCRIBED, Integers, Mask, Rows
 from flowborne.kernels.closed_fractions import (
-    ClosedByBody,
-    ClosedList,
+    Piece,
     close_faces,
     count_beside,
-    list_closed,
     open_cells,
     share_closed,
 )
@@ -97,22 +95,16 @@ def beside_sides(grid: Grid, boundaries: Boundaries) -> Integers:
     return beside
 
 
-@dataclass(frozen=True)
-class Piece:
-    """A body or flesh, or an image of it, on the grid.
+def piece_of(body: int, grid: Grid, box: Integers, phi: Array, crossings: Crossings) -> Piece:
+    """A body, or an image of it, on the grid, as yet without what it closes.
 
-    body       its number
-    grid       displaced such that the body itself is there
-    box        (3, 2) ranges of nodes
-    distance   to it at these nodes, m
-    crossings  of edges between them
+    grid  displaced such that the body itself is there
     """
-
-    body: int
-    grid: Grid
-    box: Integers
-    distance: Array
-    crossings: Crossings
+    inside = box[:, 1] - box[:, 0] - 1
+    sizes = [inside + (np.arange(3) == d) for d in range(3)]
+    share = faces_of([np.zeros(size) for size in sizes])
+    centre = faces_of([np.zeros((2, *size)) for size in sizes])
+    return Piece(body, box, grid.nodes, phi, crossings, share, centre)
 
 
 def around_bodies(
@@ -142,7 +134,7 @@ def around_bodies(
         counts = box[:, 1] - box[:, 0]
         phi = skins.distance[start : start + counts.prod()].reshape(counts)
         if phi.size:
-            yield Piece(len(boxes) + int(skins.flesh[n]), grid, box, phi, skins.crossings[n])
+            yield piece_of(len(boxes) + int(skins.flesh[n]), grid, box, phi, skins.crossings[n])
 
 
 def piece_of_body(
@@ -162,7 +154,7 @@ def piece_of_body(
         pieces = int(g) * PIECES + shapes.pieces[g]
         skin = at_place(shapes, placed, g), shapes.skins[g][1], pieces
         cross_skin(found, used, phi, *skin, box, grid.nodes)
-    return Piece(body, grid, box, phi, found)
+    return piece_of(body, grid, box, phi, found)
 
 
 def body_boxes(shapes: Shapes, position: Array, rotation: Array, bodies: int) -> Array:
@@ -246,38 +238,31 @@ def geometry(
     around = [d for d in range(3) if boundaries.periodic()[d]]
     for d in around:
         join_ends(distance, d)
-    first, own = 0, []
+    first = 0
     for piece in pieces:
         alone = piece.crossings.at, piece.distance, piece.box
         merge_crossings(crossings.at, crossings.part, distance, *alone, first)
         first += piece.crossings.part.size
-        inside = piece.box[:, 1] - piece.box[:, 0] - 1
-        sizes = [inside + (np.arange(3) == d) for d in range(3)]
-        share = faces_of([np.zeros(size) for size in sizes])
-        middle = faces_of([np.zeros((2, *size)) for size in sizes])
-        own.append(ClosedByBody(piece.body, piece.box, piece.grid.nodes, share, middle))
         for d in grid.axes:
-            close_faces(own[-1], total[d], piece.distance, piece.crossings, d)
-    parts = 0
-    for each in own:
+            close_faces(piece, total[d], d)
+    none = np.zeros(0, np.int64)
+    listed: list[tuple[Array, ...]] = [(none, none, none, np.zeros(0), np.zeros((0, 2)))]
+    for piece in pieces:
         for d in grid.axes:
             faces = opened[d], total[d], distance, crossings, beside
-            parts += share_closed(each, *faces, d, normal[d])
+            found, *parts = share_closed(piece, *faces, d, normal[d])
+            number = np.full(found.size, d), found, np.full(found.size, piece.body)
+            listed.append((*number, *parts))
     for d in around:
         join_ends(opened[d], d)
-    numbers = (np.empty(parts, np.int64) for _ in range(3))
-    listed, last = ClosedList(*numbers, np.empty(parts), np.empty((parts, 2))), 0
-    for each in own:
-        for d in grid.axes:
-            last = list_closed(each, d, np.array(grid.face_shape(d)), last, listed)
-    axis, face, part_body, closed, centre = listed
+    axis, face, part_body, closed, centre = map(np.concatenate, zip(*listed, strict=True))
     kind = kinds_of_cells(ox, oy, oz, normal)
     with_rows = kind >= NARROW
-    bones = [each for each in own if each.body < first_skin]
+    bones = [piece for piece in pieces if piece.body < first_skin]
     middles = np.concatenate([boxes.mean(axis=1), skins.middle])
     images = Images(periods(grid, boundaries), middles)
     place, index = face_centres(axis, face, grid)
-    first = int(np.searchsorted(part_body, first_skin)) if len(skins.start) else parts
+    first = int(np.searchsorted(part_body, first_skin)) if len(skins.start) else len(face)
     place[np.arange(first)[:, None], OTHER_AXES[axis[:first]]] += h * centre[:first]
     place = images.at_bodies(place, part_body)
     rows = bone_rows(bones, with_rows)
@@ -290,7 +275,7 @@ def geometry(
     volume *= grid.cell_volume
     owner, force = rows[2][::6] // 6, rows[3].reshape(-1, 6)[:, :3]
     corner, weight = np.zeros((0, 3), np.int64), np.zeros((0, 3))
-    if first < parts:
+    if first < len(face):
         corner, weight = skin_at(skins, place[first:], grid)
         skin = axis[first:], index[first:], closed[first:], corner, weight, 6 * first_skin, area
         part, of_skin = flesh_rows(*skin, with_rows)
@@ -309,23 +294,21 @@ def geometry(
         owner = np.append(owner, np.full(lent[0].size, -1))
         force = np.concatenate([force, np.zeros((lent[0].size, 3))])
         rows = joined(rows, lent)
-    closed_parts = ClosedParts(*listed[:4], place, corner, weight)
+    closed_parts = ClosedParts(axis, face, part_body, closed, place, corner, weight)
     cut = distance, nearest, crossings, (ox, oy, oz), volume
     return Geometry(*cut, closed_parts, rows, owner, force, skins, images)
 
 
-def bone_rows(bones: list[ClosedByBody], listed: Mask) -> Rows:
+def bone_rows(bones: list[Piece], listed: Mask) -> Rows:
     """Rows of J of bones in listed cells (nx, ny, nz)."""
-    none, counts = np.zeros(0, np.int64), [0]
+    cells, columns, values = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)], [np.zeros(0)]
     for bone in bones:
-        counts.append(list_cells(bone, listed, counts[-1], none, none, np.zeros(0)))
-    rows = counts[-1]
-    cells, columns = np.empty(rows, np.int64), np.empty(6 * rows, np.int64)
-    values = np.empty(6 * rows)
-    for bone, at in zip(bones, counts[:-1], strict=True):
-        if rows:
-            list_cells(bone, listed, at, cells, columns, values)
-    return cells, 6 * np.arange(rows + 1, dtype=np.int64), columns, values
+        own, wrench = list_cells(bone, listed)
+        cells.append(own)
+        columns.append(np.tile(6 * bone.body + np.arange(6), own.size))
+        values.append(wrench.ravel())
+    found = np.concatenate(cells)
+    return found, 6 * np.arange(found.size + 1), np.concatenate(columns), np.concatenate(values)
 
 
 def joined(rows: Rows, more: Rows) -> Rows:

@@ -25,44 +25,33 @@ a side of the domain, press a cell that they never press in truth: what it has t
 through such a face, at a thousand times their speed."""
 
 
-class ClosedByBody(NamedTuple):
-    """What one body, or an image of it, closes of the faces in its box.
+class Piece(NamedTuple):
+    """A body or flesh, or an image of it, on the grid, and what it alone closes of the faces there.
 
-    body    its number
-    box     (3, 2) ranges of nodes
-    nodes   displaced such that the body itself is there
-    share   part of each face
-    centre  (2, ...) of it, from that of the face along the other axes, cells
+    body       its number
+    box        (3, 2) ranges of nodes
+    nodes      displaced such that the body itself is there
+    distance   to it at the nodes of the box, m
+    crossings  of the edges between them
+    share      part of each face that it closes
+    centre     (2, ...) of that part, from that of the face along the other axes, cells
     """
 
     body: int
     box: Integers
     nodes: Nodes
+    distance: Array
+    crossings: Crossings
     share: Faces
     centre: Faces
 
 
-class ClosedList(NamedTuple):
-    """Closed parts of faces, one entry per face and body.
-
-    axis, face  (n,) axis of the face, and its flat index among those across that axis
-    body, part  (n,) the body, and the fraction that it closes
-    centre      (n, 2) of what bodies close of the face, see `ClosedByBody`
-    """
-
-    axis: Integers
-    face: Integers
-    body: Integers
-    part: Array
-    centre: Array
-
-
 @njit(nogil=True, cache=True)
-def close_faces(parts: ClosedByBody, total: Array, phi: Array, found: Crossings, axis: int) -> None:
+def close_faces(piece: Piece, total: Array, axis: int) -> None:
     """What one body alone closes of each face across `axis` in its box, in place; added to `total`,
     too."""
-    own, centre = across_axis(parts.share, axis), across_axis(parts.centre, axis)
-    box, flat = parts.box, parts.nodes.flat
+    own, centre = across_axis(piece.share, axis), across_axis(piece.centre, axis)
+    box, flat, phi, found = piece.box, piece.nodes.flat, piece.distance, piece.crossings
     for i in range(own.shape[0]):
         for j in range(own.shape[1]):
             for k in range(own.shape[2]):
@@ -123,21 +112,24 @@ def in_a_crease(beside: Integers, axis: int, i: int, j: int, k: int, ring: bool)
 
 @njit(nogil=True, cache=True)
 def share_closed(
-    parts: ClosedByBody, opened: Array, total: Array, distance: Array, found: Crossings,
+    piece: Piece, opened: Array, total: Array, distance: Array, found: Crossings,
     beside: Integers, axis: int, ends: Integers,
-) -> int:  # fmt: skip
-    """This body's part of each closed face in its box, and the open fractions; counts parts.
+) -> tuple[Integers, Array, Array]:  # fmt: skip
+    """This body's parts of the closed faces across `axis` in its box, and the open fractions.
 
-    parts     what the body alone closes, overwritten; the centres are on return those of what all
-              bodies close
+    piece     with what the body alone closes, overwritten by its part of what all bodies close, and
+              the centres by those of that
     total     the sum of what each body alone closes
     distance, found  to all bodies at the nodes, and where edges cross any
     beside    (nx, ny, nz) how many bodies and solid sides bound each cell
     ends      (2,) a of the velocity across the sides on `axis`: at a PRESCRIBED one the side, not
               the body, decides what crosses
+    returns   (n,) flat indices of the faces, (n,) its parts, and (n, 2) their centres
     """
-    share, centre = across_axis(parts.share, axis), across_axis(parts.centre, axis)
-    box, flat, count = parts.box, parts.nodes.flat, 0
+    share, centre = across_axis(piece.share, axis), across_axis(piece.centre, axis)
+    box, flat, count = piece.box, piece.nodes.flat, 0
+    most, (_, nj, nk) = np.count_nonzero(share), opened.shape
+    faces, part, middle = np.empty(most, np.int64), np.empty(most), np.empty((most, 2))
     last, ring = opened.shape[axis] - 1, ends[0] == PERIODIC
     for a in range(share.shape[0]):
         for b in range(share.shape[1]):
@@ -160,36 +152,11 @@ def share_closed(
                     share[a, b, c] = 0.0
                     continue
                 share[a, b, c] = union * own / all_own
-                count += int(share[a, b, c] > 0.0)
-    return count
-
-
-@njit(nogil=True, cache=True)
-def list_closed(
-    parts: ClosedByBody, axis: int, counts: Integers, at: int, listed: ClosedList
-) -> int:
-    """Write one body's closed parts across `axis`, and their centres, from position `at` on; gives
-    the next one.
-
-    counts  (3,) of the faces across the axis
-    """
-    share, centre = across_axis(parts.share, axis), across_axis(parts.centre, axis)
-    box = parts.box
-    upper = box[:, 1] - 1
-    upper[axis] += 1
-    for i in range(box[0, 0], upper[0]):
-        for j in range(box[1, 0], upper[1]):
-            for k in range(box[2, 0], upper[2]):
-                a, b, c = i - box[0, 0], j - box[1, 0], k - box[2, 0]
-                closed = share[a, b, c]
-                if closed > 0.0:
-                    listed.axis[at] = axis
-                    listed.face[at] = (i * counts[1] + j) * counts[2] + k
-                    listed.body[at] = parts.body
-                    listed.part[at] = closed
-                    listed.centre[at] = centre[:, a, b, c]
-                    at += 1
-    return at
+                if share[a, b, c] > 0.0:
+                    faces[count], part[count] = (i * nj + j) * nk + k, share[a, b, c]
+                    middle[count] = centre[:, a, b, c]
+                    count += 1
+    return faces[:count], part[:count], middle[:count]
 
 
 @njit(nogil=True, cache=True)

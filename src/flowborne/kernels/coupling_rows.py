@@ -10,7 +10,8 @@ from numba import njit, prange
 from numpy.typing import NDArray
 
 from flowborne.kernels.arrays import PRESCRIBED, Array, Integers, Rows
-from flowborne.kernels.closed_fractions import ClosedByBody
+from flowborne.kernels.closed_fractions import Piece
+from flowborne.kernels.control_volumes import across_axis
 from flowborne.kernels.jit import inlined, kernel
 
 Kinds = NDArray[np.int8]
@@ -77,10 +78,11 @@ def kinds_of_cells(ox: Array, oy: Array, oz: Array, normal: Integers) -> Kinds:
 
 
 @njit(nogil=True, cache=True)
-def cell_wrench(wrench: Array, i: int, j: int, k: int, parts: ClosedByBody) -> None:
+def cell_wrench(wrench: Array, i: int, j: int, k: int, piece: Piece) -> None:
     """Wrench of unit pressure in cell (i, j, k) on the body: what acts on a closed part of a face
     acts at its centre."""
-    _, box, (origin, h, flat), (sx, sy, sz), (cx, cy, cz) = parts
+    box, (origin, h, flat) = piece.box, piece.nodes
+    (sx, sy, sz), (cx, cy, cz) = piece.share, piece.centre
     area = h if flat else h * h
     a, b, c = i - box[0, 0], j - box[1, 0], k - box[2, 0]
     x, y = origin[0] + h * (i + 0.5), origin[1] + h * (j + 0.5)
@@ -104,22 +106,15 @@ def cell_wrench(wrench: Array, i: int, j: int, k: int, parts: ClosedByBody) -> N
 
 
 @njit(nogil=True, cache=True)
-def list_cells(
-    parts: ClosedByBody,
-    listed: NDArray[np.bool_],
-    at: int,
-    cells: Integers,
-    columns: Integers,
-    values: Array,
-) -> int:
-    """Write the coupling rows of one body in listed cells from row `at` on; gives the next one.
-
-    With `cells` of length 0 it only counts. Where the body closes as much on either side of a cell,
-    at the same place, it has no row.
-    """
-    body, box, (_, _, flat), (sx, sy, sz), _ = parts
-    wrench = np.empty(6)
-    n = listed.shape
+def list_cells(piece: Piece, listed: NDArray[np.bool_]) -> tuple[Integers, Array]:
+    """Listed cells (n,) with a coupling row of one body, flat, and (n, 6) its values, the wrench of
+    unit pressure. Where the body closes as much on either side of a cell, at the same place, it has
+    no row."""
+    box, flat, (sx, sy, sz) = piece.box, piece.nodes.flat, piece.share
+    most, n, at = 0, listed.shape, 0
+    for axis in range(3):
+        most += 2 * np.count_nonzero(across_axis(piece.share, axis))
+    wrench, cells, values = np.empty(6), np.empty(most, np.int64), np.empty((most, 6))
     for i in range(box[0, 0], box[0, 1] - 1):
         for j in range(box[1, 0], box[1, 1] - 1):
             for k in range(box[2, 0], box[2, 1] - 1):
@@ -129,15 +124,11 @@ def list_cells(
                     closed += sz[a, b, c] + sz[a, b, c + 1]
                 if closed == 0.0 or not listed[i, j, k]:
                     continue
-                cell_wrench(wrench, i, j, k, parts)
+                cell_wrench(wrench, i, j, k, piece)
                 if wrench.any():
-                    if cells.size:
-                        cells[at] = (i * n[1] + j) * n[2] + k
-                        for m in range(6):
-                            columns[6 * at + m] = 6 * body + m
-                            values[6 * at + m] = wrench[m]
+                    cells[at], values[at] = (i * n[1] + j) * n[2] + k, wrench
                     at += 1
-    return at
+    return cells[:at], values[:at]
 
 
 @njit(nogil=True, cache=True)

@@ -75,7 +75,7 @@ def share_closed_reference(
 def list_closed_reference(
     share: Array, centre: Array, box: Integers, counts: Integers
 ) -> tuple[Integers, Array, Array]:
-    """`list_closed` in NumPy: flat indices of the faces, their closed parts, and the centres."""
+    """Flat indices of the faces, their closed parts, and the centres, in NumPy."""
     there = share > 0.0
     places = np.stack(np.nonzero(there)) + box[:, :1]
     return np.ravel_multi_index(tuple(places), tuple(counts)), share[there], centre[:, there].T

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flowborne.kernels.arrays import PRESCRIBED, Array, Faces, Integers, Rows
-from flowborne.kernels.closed_fractions import ClosedByBody
+from flowborne.kernels.closed_fractions import Piece
 from flowborne.kernels.coupling_rows import COVERED, ENCLOSED, NARROW, WIDE, Kinds
 
 
@@ -27,11 +27,9 @@ def kinds_of_cells_reference(opened: Faces, normal: Integers) -> Kinds:
     return kind
 
 
-def list_cells_reference(
-    parts: ClosedByBody, listed: NDArray[np.bool_]
-) -> tuple[Integers, Integers, Array]:
-    """`list_cells` in NumPy: cells (m,), columns (6m,) and values (6m,)."""
-    body, box, (origin, h, flat), share, centre = parts
+def list_cells_reference(piece: Piece, listed: NDArray[np.bool_]) -> tuple[Integers, Array]:
+    """`list_cells` in NumPy: cells (n,) and values (n, 6)."""
+    box, (origin, h, flat), share, centre = piece.box, piece.nodes, piece.share, piece.centre
     inside = tuple(slice(low, high - 1) for low, high in box)
     area = h if flat else h**2
     cell = np.moveaxis(np.indices(listed.shape)[(slice(None), *inside)], 0, -1)
@@ -52,7 +50,7 @@ def list_cells_reference(
     place = np.stack(np.nonzero(found), axis=1) + box[:, 0]
     values = wrench[found]
     cells = np.ravel_multi_index(tuple(place.T), listed.shape)
-    return cells, np.tile(6 * body + np.arange(6), cells.size), values.ravel()
+    return cells, values
 
 
 def flesh_rows_reference(
