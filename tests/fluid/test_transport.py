@@ -19,7 +19,8 @@ from flowborne.fluid.sides.kinds import (
     BoundaryOpen,
     BoundaryPeriodic,
 )
-from flowborne.fluid.transport import COURANT, NO_INLETS, Inlets, Transport, carry_component
+from flowborne.fluid.transport import COURANT, NO_INLETS, Transport, carry_component
+from flowborne.kernels.carry import Inlets
 
 from ..kernels.references.faces import face_means
 

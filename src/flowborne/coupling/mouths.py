@@ -26,8 +26,9 @@ from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.dye import Brought
 from flowborne.fluid.grid import Array, Grid
 from flowborne.fluid.sides.far import Strength
-from flowborne.fluid.transport import NO_INLETS, Inlets
+from flowborne.fluid.transport import NO_INLETS
 from flowborne.kernels.arrays import Integers, Mask
+from flowborne.kernels.carry import Inlets
 from flowborne.solids.dynamics import Kinematics
 
 DEPTH = 3.0

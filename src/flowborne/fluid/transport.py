@@ -28,7 +28,7 @@ from flowborne.fluid.control_volumes import NOTHING, ControlVolumes
 from flowborne.fluid.ghosts import edge, face_grid, packed_sides, plane, planes
 from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.kernels.arrays import Integers, Marks
-from flowborne.kernels.carry import Exchange, Inflows, Scratch, Volumes, carry, prepare
+from flowborne.kernels.carry import Exchange, Inlets, Scratch, Volumes, carry, prepare
 from flowborne.kernels.control_volumes import Transfers
 from flowborne.kernels.flux import GHOSTS, Fluxes, Padded, largest_crossing
 
@@ -51,22 +51,6 @@ step: noise as fine as the grid."""
 def parts_for(amount: float) -> int:
     """Fewest equal parts of which none is greater than 1; one of what is not a finite number."""
     return max(1, int(np.ceil(amount - SLACK))) if np.isfinite(amount) else 1
-
-
-@dataclass(frozen=True)
-class Inlets:
-    """What comes into the control volumes of one component from within, and goes there.
-
-    index     (n,) flat, each once
-    gain      (n,) m^3/s that come in with
-    velocity  (n,) m/s
-    loss      (n,) m^3/s that leave with the velocity of the fluid there; negative come in with it
-    """
-
-    index: Integers
-    gain: Array
-    velocity: Array
-    loss: Array
 
 
 NO_INLETS = Inlets(np.zeros(0, np.int64), np.zeros(0), np.zeros(0), np.zeros(0))
@@ -165,8 +149,7 @@ def carry_component(
     means = neighbours(int(faces.shape[faces.component]), ring)
     flux = Fluxes(planes(transport.flux, grid), faces.component, *means)
     given = passed_on(before.transfers[component], after.transfers[component], transport.dt)
-    inflows = Inflows(inlets.index, inlets.gain * inlets.velocity, inlets.loss)
-    exchange = Exchange(flux, table, inflows, given)
+    exchange = Exchange(flux, table, inlets, given)
     cut = np.union1d(before.cut[component], after.cut[component])
     out = np.empty(velocity.shape)
     fields = plane(out, grid), plane(velocity, grid), plane(velocity, grid)

@@ -81,12 +81,18 @@ class Volumes(NamedTuple):
     nothing: float
 
 
-class Inflows(NamedTuple):
-    """What inlets bring: volume x velocity per time, and volume per time that leaves with the
-    fluid's own; in flat control volumes, each once."""
+class Inlets(NamedTuple):
+    """What comes into the control volumes of one component from within, and goes there.
 
-    faces: Integers
-    brought: Array
+    index     (n,) flat, each once
+    gain      (n,) m^3/s that come in with
+    velocity  (n,) m/s
+    loss      (n,) m^3/s that leave with the velocity of the fluid there; negative come in with it
+    """
+
+    index: Integers
+    gain: Array
+    velocity: Array
     loss: Array
 
 
@@ -95,7 +101,7 @@ class Exchange(NamedTuple):
 
     flux: Fluxes
     sides: Sides
-    inflows: Inflows
+    inlets: Inlets
     given: Transfers
 
 
@@ -213,12 +219,12 @@ def what_flows_out(exchange: Exchange, listed: Integers, shape: Integers) -> Arr
     """(n,) volume per time that leaves listed control volumes through their sides, inlets and
     transfers."""
     rate, total = side_rates(exchange.flux, listed, shape), np.zeros(listed.size)
-    inflows, given = exchange.inflows, exchange.given
+    inlets, given = exchange.inlets, exchange.given
     for n in range(listed.size):
         for way in range(6):
             total[n] += max(rate[n, way], 0.0)
     for faces, out, sign in (
-        (inflows.faces, inflows.loss, 1.0),
+        (inlets.index, inlets.loss, 1.0),
         (given.givers, given.volume, 1.0),
         (given.takers, given.volume, -1.0),
     ):
@@ -410,18 +416,18 @@ def fill_and_follow(u: Array, held: Array, volumes: Volumes, shut: Closed) -> No
 
 
 @njit(nogil=True, cache=True)
-def pass_inlets(now: Stage, padded: Array, inflows: Inflows, own: Array) -> None:
+def pass_inlets(now: Stage, padded: Array, inlets: Inlets, own: Array) -> None:
     """Let through inlets what they bring to a padded field after a stage, in place.
 
     own  (n,) on return what leaves at each with the fluid's own velocity, per time
     """
     flat, shape = in_line(now), now.later.shape
     for n in range(own.size):
-        f = inflows.faces[n]
+        f = inlets.index[n]
         i, j, k = f // (shape[1] * shape[2]), (f // shape[2]) % shape[1], f % shape[2]
         i += (padded.shape[0] - shape[0]) // 2
-        own[n] = inflows.loss[n] * padded[i, j + GHOSTS, k + GHOSTS]
-        give(flat, f, own[n] - inflows.brought[n])
+        own[n] = inlets.loss[n] * padded[i, j + GHOSTS, k + GHOSTS]
+        give(flat, f, own[n] - inlets.gain[n] * inlets.velocity[n])
 
 
 @kernel
@@ -442,11 +448,11 @@ def carry(
     along  what else it is given, velocity per time, times `rising`
     dt     s, of each substep
     """
-    faces, sides, inflows = volumes.faces, exchange.sides, exchange.inflows
+    faces, sides, inlets = volumes.faces, exchange.sides, exchange.inlets
     padded, middle, count = scratch.padded, scratch.middle, len(sides.wall) - 1
     start, later = (out, scratch.start) if count % 2 == 0 else (scratch.start, out)
     low = volumes.before
-    inlets, drained = np.zeros(inflows.faces.size), np.zeros(inflows.faces.size)
+    leaving, drained = np.zeros(inlets.index.size), np.zeros(inlets.index.size)
     crossed, held = 0.0, 0.0
     part_of_step(start, u, u, 0.0)
     fill_and_follow(start, low, volumes, volumes.was_shut)
@@ -467,13 +473,13 @@ def carry(
             fill_ghosts(padded.values, sides, s + turn, faces)
             came = draw_in(padded, sides, faces.shape)
             stage(now, start, low, padded, exchange.flux)
-            pass_inlets(now, padded.values, inflows, inlets)
+            pass_inlets(now, padded.values, inlets, leaving)
             add_transfers(now, source, exchange.given)
             if turn == 1:
                 held += empty_at_walls(now, sides, faces)
             settle(target, high, volumes, dt, scratch.nought)
             crossed += 0.5 * dt * came
-            drained += 0.5 * dt * inlets
+            drained += 0.5 * dt * leaving
         if s < count - 1:
             held += hold(later, high, sides, s + 1, faces)
             start, later, low = later, start, high
