@@ -246,13 +246,13 @@ def geometry(
         for d in grid.axes:
             close_faces(piece, total[d], d)
     none = np.zeros(0, np.int64)
-    listed: list[tuple[Array, ...]] = [(none, none, none, np.zeros(0), np.zeros((0, 2)))]
+    listed = [(none, none, none, np.zeros(0), np.zeros((0, 2)))]
     for piece in pieces:
         for d in grid.axes:
             faces = opened[d], total[d], distance, crossings, beside
-            found, *parts = share_closed(piece, *faces, d, normal[d])
-            number = np.full(found.size, d), found, np.full(found.size, piece.body)
-            listed.append((*number, *parts))
+            face, closed, centre = share_closed(piece, *faces, d, normal[d])
+            axis, part_body = np.full(face.size, d), np.full(face.size, piece.body)
+            listed.append((axis, face, part_body, closed, centre))
     for d in around:
         join_ends(opened[d], d)
     axis, face, part_body, closed, centre = map(np.concatenate, zip(*listed, strict=True))

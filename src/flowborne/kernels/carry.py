@@ -84,13 +84,13 @@ class Volumes(NamedTuple):
 class Inlets(NamedTuple):
     """What comes into the control volumes of one component from within, and goes there.
 
-    index     (n,) flat, each once
+    faces     (n,) flat, each once
     gain      (n,) m^3/s that come in with
     velocity  (n,) m/s
     loss      (n,) m^3/s that leave with the velocity of the fluid there; negative come in with it
     """
 
-    index: Integers
+    faces: Integers
     gain: Array
     velocity: Array
     loss: Array
@@ -224,7 +224,7 @@ def what_flows_out(exchange: Exchange, listed: Integers, shape: Integers) -> Arr
         for way in range(6):
             total[n] += max(rate[n, way], 0.0)
     for faces, out, sign in (
-        (inlets.index, inlets.loss, 1.0),
+        (inlets.faces, inlets.loss, 1.0),
         (given.givers, given.volume, 1.0),
         (given.takers, given.volume, -1.0),
     ):
@@ -423,7 +423,7 @@ def pass_inlets(now: Stage, padded: Array, inlets: Inlets, own: Array) -> None:
     """
     flat, shape = in_line(now), now.later.shape
     for n in range(own.size):
-        f = inlets.index[n]
+        f = inlets.faces[n]
         i, j, k = f // (shape[1] * shape[2]), (f // shape[2]) % shape[1], f % shape[2]
         i += (padded.shape[0] - shape[0]) // 2
         own[n] = inlets.loss[n] * padded[i, j + GHOSTS, k + GHOSTS]
@@ -452,7 +452,7 @@ def carry(
     padded, middle, count = scratch.padded, scratch.middle, len(sides.wall) - 1
     start, later = (out, scratch.start) if count % 2 == 0 else (scratch.start, out)
     low = volumes.before
-    leaving, drained = np.zeros(inlets.index.size), np.zeros(inlets.index.size)
+    leaving, drained = np.zeros(inlets.faces.size), np.zeros(inlets.faces.size)
     crossed, held = 0.0, 0.0
     part_of_step(start, u, u, 0.0)
     fill_and_follow(start, low, volumes, volumes.was_shut)

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from flowborne.kernels.arrays import PRESCRIBED, Array, Integers, Rows
 from flowborne.kernels.closed_fractions import Piece
-from flowborne.kernels.control_volumes import across_axis
 from flowborne.kernels.jit import inlined, kernel
 
 Kinds = NDArray[np.int8]
@@ -111,9 +110,8 @@ def list_cells(piece: Piece, listed: NDArray[np.bool_]) -> tuple[Integers, Array
     unit pressure. Where the body closes as much on either side of a cell, at the same place, it has
     no row."""
     box, flat, (sx, sy, sz) = piece.box, piece.nodes.flat, piece.share
-    most, n, at = 0, listed.shape, 0
-    for axis in range(3):
-        most += 2 * np.count_nonzero(across_axis(piece.share, axis))
+    n, at = listed.shape, 0
+    most = 2 * int(np.count_nonzero(sx) + np.count_nonzero(sy) + np.count_nonzero(sz))
     wrench, cells, values = np.empty(6), np.empty(most, np.int64), np.empty((most, 6))
     for i in range(box[0, 0], box[0, 1] - 1):
         for j in range(box[1, 0], box[1, 1] - 1):
