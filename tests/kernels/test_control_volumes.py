@@ -11,6 +11,7 @@ import pytest
 from flowborne.kernels.arrays import FREE, PERIODIC, PRESCRIBED, FaceGrid
 from flowborne.kernels.control_volumes import (
     DRIVEN,
+    Closed,
     fill_empty,
     find_targets,
     join_small,
@@ -151,7 +152,7 @@ def test_small_ones_give_to_targets(shape: tuple, periodic: tuple, component: in
     amount = np.random.default_rng(1).standard_normal(case.volumes.shape)
     merged = amount.copy()
     shares = parts * np.random.default_rng(2).uniform(size=len(parts))[:, None]
-    merge_small(merged, case.small, targets, shares)
+    merge_small(merged, Closed(case.small, targets, shares))
     expected = merge_small_reference(amount, case.small, targets, shares)
     np.testing.assert_allclose(merged, expected, atol=1e-14)
     assert merged.sum() == pytest.approx(amount.sum(), abs=1e-13 * np.abs(amount).sum())
@@ -167,7 +168,7 @@ def test_small_ones_bring_what_they_hold(shape: tuple, periodic: tuple, componen
     joined, merged = field.copy(), volumes.copy()
     shares = parts * np.random.default_rng(2).uniform(size=len(parts))[:, None]
     shares[::2] = parts[::2]
-    join_small(joined, merged, case.small, targets, shares, 1e-9)
+    join_small(joined, merged, Closed(case.small, targets, shares), 1e-9)
     expected, volumes_after = join_small_reference(
         field, volumes, case.small, targets, shares, 1e-9
     )
@@ -227,7 +228,7 @@ def test_share_velocity(shape: tuple, periodic: tuple, component: int) -> None:
     shares = 0.5 * random.random((20, 2))
     field = random.standard_normal(case.shape)
     expected = share_velocity_reference(field, small, targets, shares)
-    share_velocity(field, small, targets, shares)
+    share_velocity(field, Closed(small, targets, shares))
     np.testing.assert_allclose(field, expected, rtol=1e-14, atol=1e-15)
 
 

@@ -68,7 +68,7 @@ class ControlVolumes:
     def follow(self, velocity: Faces, grid: Grid) -> None:
         """Give closed faces the velocity of their targets, in place."""
         for axis in grid.axes:
-            share_velocity(velocity[axis], *self.closed[axis])
+            share_velocity(velocity[axis], self.closed[axis])
 
 
 def control_volumes(

@@ -396,7 +396,7 @@ def settle(later: Array, high: Array, volumes: Volumes, span: float, nought: Arr
     for n in range(shut.size):
         was[n, 0], was[n, 1] = held[targets[n, 0]], held[targets[n, 1]]
         was[n, 2] = held[shut[n]]
-    join_small(later, high, shut, targets, volumes.shut.shares, volumes.nothing)
+    join_small(later, high, volumes.shut, volumes.nothing)
     leaving = span * volumes.leaving
     level(later, high, volumes.cut, leaving, nought, volumes.nothing, volumes.faces)
     for n in range(shut.size):
@@ -410,7 +410,7 @@ def fill_and_follow(u: Array, held: Array, volumes: Volumes, shut: Closed) -> No
     """Give control volumes that hold nothing the velocity around them, closed ones that of their
     targets, and the last ones of a periodic axis that of the first ones, in place."""
     fill_empty(u, held, volumes.cut, volumes.nothing, volumes.faces)
-    share_velocity(u, shut.faces, shut.targets, shut.shares)
+    share_velocity(u, shut)
     if volumes.faces.wraps[volumes.faces.component] > 0:
         join(u, volumes.faces.component)
 

@@ -175,9 +175,9 @@ def find_targets(
 
 
 @njit(nogil=True, cache=True)
-def merge_small(amount: Array, small: Integers, targets: Integers, shares: Array) -> None:
-    """Give these shares (n, 2) of the amounts of small ones to their targets (n, 2), in place."""
-    flat = amount.reshape(-1)
+def merge_small(amount: Array, closed: Closed) -> None:
+    """Give the targets of closed ones their shares of what these have of an amount, in place."""
+    flat, (small, targets, shares) = amount.reshape(-1), closed
     for n in range(small.size):
         own = flat[small[n]]
         for m in range(2):
@@ -187,17 +187,15 @@ def merge_small(amount: Array, small: Integers, targets: Integers, shares: Array
 
 
 @njit(nogil=True, cache=True)
-def join_small(
-    field: Array, volumes: Array, small: Integers, targets: Integers, shares: Array, nothing: float
-) -> None:
-    """Give these shares (n, 2) of what small ones hold, and of their volumes, to their targets, in
+def join_small(field: Array, volumes: Array, closed: Closed, nothing: float) -> None:
+    """Give the targets of closed ones their shares of what these hold, and of their volumes, in
     place.
 
     field    value of each control volume, what is left of the amount where there is no volume above
              `nothing`
     volumes  of each
     """
-    flat, volume = field.reshape(-1), volumes.reshape(-1)
+    flat, volume, (small, targets, shares) = field.reshape(-1), volumes.reshape(-1), closed
     for n in range(small.size):
         g = small[n]
         room = volume[g]
@@ -289,10 +287,11 @@ def level(
 
 
 @njit(nogil=True, cache=True)
-def share_velocity(field: Array, small: Integers, targets: Integers, shares: Array) -> None:
-    """Give small ones the velocity of all that goes with them, in place: these shares (n, 2) of
-    them go with their targets (n, 2)."""
-    flat, shared = field.reshape(-1), np.empty(small.size)
+def share_velocity(field: Array, closed: Closed) -> None:
+    """Give closed ones the velocity of all that goes with them, in place: their shares with their
+    targets."""
+    flat, (small, targets, shares) = field.reshape(-1), closed
+    shared = np.empty(small.size)
     for n in range(small.size):
         shared[n] = (1.0 - shares[n, 0] - shares[n, 1]) * flat[small[n]]
         shared[n] += shares[n, 0] * flat[targets[n, 0]] + shares[n, 1] * flat[targets[n, 1]]

@@ -290,7 +290,7 @@ def share_out(
                 for n in range(shut.size):
                     for m in range(2):
                         lent[n, m] = closed.shares[n, m] * flat[shut[n]]
-                merge_small(volume, shut, closed.targets, closed.shares)
+                merge_small(volume, closed)
                 for n in range(size):
                     held[n] = flat[listed[n]]
     for n in range(shut.size):
