@@ -60,7 +60,6 @@ def packed_sides(
     see `kernels.carry`.
 
     flux  volume per time through each face, m^3/s
-
     """
     table, walls, changes, first = [], [], [], 0
     shape = grid.face_shape(component)

@@ -85,10 +85,11 @@ class Boundary:
     kind        its name in scenes and messages
     normal      a of the velocity across it
     tangential  a of the velocity along it
-    supplies    whether fluid enters with the prescribed velocity: an inflow and a wall have one a,
-                but dye, or a window that moves, can only come through an inflow
-    endless     whether the fluid beyond belongs to a sea that answers the flow inside: an open side
-                has the same a, and nothing beyond it
+    supplies    whether fluid enters with the prescribed velocity. An inflow has a wall's a, but
+                dye comes in through it, a window may move across it, and its faces get their
+                velocity again after each substep
+    endless     whether the fluid beyond is a sea, which answers the flow inside. An open side has
+                the same a, and nothing beyond it
     """
 
     kind: ClassVar[str]
