@@ -13,8 +13,14 @@ SOURCE = Path(flowborne.__file__).parent
 MOST = 8
 """Parameters of a function, `self` and `cls` aside; what belongs together comes as one."""
 
-LONGER = {"coupling/solve.py solve_together": 9}
-"""Those that still have more, and how many; nothing is added here."""
+LONGER = {
+    "coupling/solve.py solve_together": 9,
+    "kernels/dye.py bend_row": 10,
+    "kernels/dye.py cross_row": 10,
+    "kernels/flux.py side_row": 12,
+}
+"""Those that still have more, and how many; nothing is added here. What is called for every row of
+a field takes its arrays one by one: with tuples of them it needs half as long again, or more."""
 
 
 def parameters(tree: ast.Module) -> Iterator[tuple[str, int]]:
@@ -30,12 +36,11 @@ def parameters(tree: ast.Module) -> Iterator[tuple[str, int]]:
                 yield inner.name, len(named) + len(rest)
 
 
-def test_functions_outside_kernels_have_few_parameters() -> None:
+def test_functions_have_few_parameters() -> None:
     """The list is exact, so that whoever shortens one of it takes it off."""
     longer = {
         f"{path.relative_to(SOURCE).as_posix()} {name}": count
         for path in SOURCE.rglob("*.py")
-        if not path.is_relative_to(SOURCE / "kernels")
         for name, count in parameters(ast.parse(path.read_text(encoding="utf-8")))
         if count > MOST
     }

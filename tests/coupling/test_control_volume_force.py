@@ -16,7 +16,7 @@ from flowborne.fluid.control_volumes import face_masses
 from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.fluid.transport import damp_eddies
 from flowborne.kernels import carry as kernels
-from flowborne.kernels.flux import GHOSTS
+from flowborne.kernels.flux import GHOSTS, Fluxes, Padded, Stage
 
 from ..kernels.references.flux import line_flux_reference, side_fluxes_reference
 from .test_flux_form import CUBE, SQUARE, channel, free
@@ -43,10 +43,9 @@ def momentum_in(world: World, box: Box) -> Array:
     return np.array([float((m[box] * u[box]).sum()) for m, u in pairs])
 
 
-def out_of_box(stage: tuple[Any, ...], box: Box) -> float:
+def out_of_box(padded: Padded, flux: Fluxes, box: Box) -> float:
     """What leaves a box of control volumes per time in one stage, m^4/s, by NumPy."""
-    field, marks, q, component, place, share = stage
-    through = side_fluxes_reference(q, component, place, share)
+    (field, marks), through = padded, side_fluxes_reference(flux)
     flat = field.shape[0] == 1
     inside = (slice(None), *box[:2]) if flat else box
     total = 0.0
@@ -63,8 +62,8 @@ def out_of_box(stage: tuple[Any, ...], box: Box) -> float:
                 near[axis] = slice(at + shift + GHOSTS, at + shift + GHOSTS + 1)
                 line.append(field[tuple(near)])
                 mark.append(marks[tuple(near)])
-            flux = line_flux_reference(through[axis][tuple(layer)], *line, mark[1], mark[2])
-            total += sign * float(flux.sum())
+            found = line_flux_reference(through[axis][tuple(layer)], *line, mark[1], mark[2])
+            total += sign * float(found.sum())
     return total
 
 
@@ -74,13 +73,12 @@ def test_the_force_is_that_of_a_control_volume(
     monkeypatch: pytest.MonkeyPatch, grid: Grid, held: bool
 ) -> None:
     world = channel(grid) if held else free(grid)
-    stages: list[tuple[Any, ...]] = []
+    stages: list[tuple[Padded, Fluxes]] = []
     carried = kernels.stage
 
-    def recorded(*arguments: Any) -> None:
-        padded, marks = arguments[8].copy(), arguments[9].copy()
-        stages.append((padded, marks, *arguments[10:]))
-        carried(*arguments)
+    def recorded(now: Stage, start: Array, before: Array, padded: Padded, flux: Fluxes) -> None:
+        stages.append((Padded(*(values.copy() for values in padded)), flux))
+        carried(now, start, before, padded, flux)
 
     crossed = np.zeros(3)
 
@@ -105,7 +103,7 @@ def test_the_force_is_that_of_a_control_volume(
         change = momentum_in(world, box) - before
         for axis in grid.axes:
             pair = stages[2 * grid.axes.index(axis) : 2 * grid.axes.index(axis) + 2]
-            left = DT * fluid.density * np.mean([out_of_box(stage, box) for stage in pair])
+            left = DT * fluid.density * np.mean([out_of_box(*stage, box) for stage in pair])
             left -= fluid.density * crossed[axis]  # eddies on the sides of the box
             below, above = list(box), list(box)
             below[axis] = slice(box[axis].start - 1, box[axis].start)

@@ -8,12 +8,12 @@ import pytest
 from flowborne.coupling.step import step
 from flowborne.coupling.world import Fluid, Setup, World
 from flowborne.fluid.boundary import Boundaries
-from flowborne.fluid.ghosts import packed_sides
+from flowborne.fluid.ghosts import face_grid, packed_sides
 from flowborne.fluid.grid import Grid, faces_of
 from flowborne.fluid.sides.kinds import BoundaryOpen
 from flowborne.fluid.transport import neighbours, planes
-from flowborne.kernels.carry import Fluxes, cross_sides, draw_in, fill_ghosts, mark_volumes
-from flowborne.kernels.flux import GHOSTS
+from flowborne.kernels.carry import cross_sides, draw_in, fill_ghosts, mark_volumes
+from flowborne.kernels.flux import GHOSTS, Fluxes, Padded
 from flowborne.solids.model import SolidModel
 
 from ..kernels.references.faces import face_means
@@ -32,15 +32,16 @@ def test_what_comes_in_has_the_mean_velocity_and_what_leaves_its_own(
     flux = grid.zeros_faces()
     flux[0][-end] = random.normal(size=flux[0][-end].shape)
     u, cells = random.normal(size=grid.face_shape(component)), random.random(grid.shape)
-    axis, shape = component + 1, np.array([1, *grid.face_shape(component)[:2]])
-    padded = np.pad(u.reshape(shape), [(GHOSTS * (n > 0),) * 2 for n in range(3)])
+    faces = face_grid(component, grid, sides)
+    field = np.pad(u.reshape(faces.shape), [(GHOSTS * (n > 0),) * 2 for n in range(3)])
     table = packed_sides(component, grid, sides, [0.0], faces_of(flux))
-    through = Fluxes(planes(faces_of(flux), grid), *neighbours(int(shape[axis]), False))
-    marks = np.empty(padded.shape, np.uint8)
-    mark_volumes(marks, np.zeros(0, np.int64), table, shape, 0 * shape, axis)
-    cross_sides(table, through, cells.reshape(1, 7, 6), axis, shape)
-    fill_ghosts(padded, table, 0, shape, axis)
-    came = draw_in(padded, marks, table, shape)
+    means = neighbours(u.shape[component], False)
+    through = Fluxes(planes(faces_of(flux), grid), faces.component, *means)
+    padded = Padded(field, np.empty(field.shape, np.uint8))
+    mark_volumes(padded.marks, np.zeros(0, np.int64), table, faces)
+    cross_sides(table, through, cells.reshape(1, 7, 6), faces)
+    fill_ghosts(padded.values, table, 0, faces)
+    came = draw_in(padded, table, faces.shape)
     mean = float(np.average(u[-end], weights=face_means(cells, component, False)[-end]))
     rate = (-flux[0] if end else flux[0])[[-end]]
     if component == 1:

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from flowborne.kernels.arrays import Nodes
+from flowborne.kernels.closed_fractions import Piece
 from flowborne.kernels.edge_crossings import Crossings, new_crossings
 
 SHAPES = [(9, 8, 7), (10, 9, 1)]
@@ -41,6 +43,11 @@ class Cut:
     def own_crossings(self) -> Crossings:
         """The same with the first ball."""
         return new_crossings(self.phi, H, self.flat)
+
+    def piece(self, share: np.ndarray, centre: np.ndarray) -> Piece:
+        """The first ball, number 7, which closes that of the faces across every axis."""
+        nodes, closed = Nodes(ORIGIN, H, self.flat), ((share,) * 3, (centre,) * 3)
+        return Piece(7, self.box, nodes, self.phi, self.own_crossings, *closed)
 
 
 def nodes(shape: tuple[int, int, int]) -> np.ndarray:

@@ -5,14 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flowborne.kernels.arrays import CLOSED, OPEN, PERIODIC
-from flowborne.kernels.closed_fractions import (
-    CREASE,
-    close_faces,
-    count_beside,
-    list_closed,
-    share_closed,
-)
+from flowborne.kernels.arrays import FREE, PERIODIC, PRESCRIBED
+from flowborne.kernels.closed_fractions import CREASE, close_faces, count_beside, share_closed
 
 from .cut_cells import SHAPES, cut, face_shape
 from .references.closed_fractions import (
@@ -33,7 +27,7 @@ def test_close_faces(shape: tuple[int, int, int], axis: int) -> None:
     expected, total = face_closed_reference(made.phi, axis), before.copy()
     assert expected.max() > 0.5
     own, centre = np.empty(expected.shape), np.zeros((2, *expected.shape))
-    close_faces(own, centre, total, made.phi, made.own_crossings, made.box, axis, made.flat)
+    close_faces(made.piece(own, centre), total, axis)
     np.testing.assert_allclose(own, expected, atol=1e-14)
     cut_through = (expected > 0.0) & (expected < 1.0)
     assert not centre[:, ~cut_through].any()
@@ -53,13 +47,13 @@ def test_count_beside(shape: tuple[int, int, int]) -> None:
 
 @pytest.mark.parametrize(("shape", "axis"), AXES)
 @pytest.mark.parametrize(
-    "sides", [(OPEN, OPEN), (CLOSED, OPEN), (OPEN, CLOSED), (PERIODIC, PERIODIC)]
+    "sides", [(FREE, FREE), (PRESCRIBED, FREE), (FREE, PRESCRIBED), (PERIODIC, PERIODIC)]
 )
 def test_shares_and_their_list(
     shape: tuple[int, int, int], axis: int, sides: tuple[int, int]
 ) -> None:
     """Some faces in a crease and just below its limit."""
-    made, codes, random = cut(shape), np.array(sides), np.random.default_rng(3)
+    made, ends, random = cut(shape), np.array(sides), np.random.default_rng(3)
     beside = random.integers(0, 3, shape)
     share = face_closed_reference(made.phi, axis)
     centre = random.uniform(-0.5, 0.5, (2, *share.shape))
@@ -70,13 +64,12 @@ def test_shares_and_their_list(
     opened = np.ones(total.shape)
     union = face_closed_reference(made.distance, axis)
     assert ((union > 1.0 - 10.0 * CREASE) & (union < 1.0)).any()
-    parts = opened, total, made.distance
-    rest = beside, made.box, axis, codes
-    expected, opening = share_closed_reference(share, *parts, *rest)
-    count = share_closed(share, centre, *parts, made.crossings, *rest, made.flat)
+    piece, faces = made.piece(share, centre), (opened, total, made.distance)
+    expected, opening = share_closed_reference(share, *faces, beside, made.box, axis, ends)
+    found = share_closed(piece, *faces, made.crossings, beside, axis, ends)
     np.testing.assert_allclose(share, expected, atol=1e-14)
     np.testing.assert_allclose(opened, opening, atol=1e-14)
-    assert count == (expected > 0.0).sum()
+    assert len(found[0]) == (expected > 0.0).sum()
     at = faces_in(made.box, axis)
     shut = (alone > 0.0) & (opening[at] == 0.0)
     assert not centre[:, shut].any()
@@ -84,24 +77,13 @@ def test_shares_and_their_list(
     np.testing.assert_array_equal(centre[:, single], own_centre[:, single])
     both, middle = np.zeros(total.shape), np.zeros((2, *total.shape))
     everywhere = np.array([[0, n] for n in made.distance.shape])
-    close_faces(
-        both, middle, total.copy(), made.distance, made.crossings, everywhere, axis, made.flat
-    )
+    whole = {"box": everywhere, "distance": made.distance, "crossings": made.crossings}
+    close_faces(made.piece(both, middle)._replace(**whole), total.copy(), axis)
     several = ~shut & (alone > 0.0) & (alone != total[at])
     np.testing.assert_array_equal(centre[:, several], middle[:, *at][:, several])
     assert single.any()
     assert several.any()
     assert shut.any()
-    counts = np.array(total.shape)
-    faces, closed, centres = list_closed_reference(share, centre, made.box, counts)
-    found = [np.full(count + 3, -1) for _ in range(3)]
-    parts_of, place_of = np.full(count + 3, -1.0), np.full((count + 3, 2), -1.0)
-    listed = *found, parts_of, place_of
-    assert list_closed(share, centre, made.box, axis, 7, counts, 2, *listed) == count + 2
-    inner = slice(2, count + 2)
-    np.testing.assert_array_equal(found[0][inner], axis)
-    np.testing.assert_array_equal(found[1][inner], faces)
-    np.testing.assert_array_equal(found[2][inner], 7)
-    np.testing.assert_array_equal(parts_of[inner], closed)
-    np.testing.assert_array_equal(place_of[inner], centres)
-    assert (np.delete(parts_of, inner) == -1.0).all()
+    listed = list_closed_reference(share, centre, made.box, np.array(total.shape))
+    for one, other in zip(found, listed, strict=True):
+        np.testing.assert_array_equal(one, other)

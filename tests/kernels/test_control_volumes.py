@@ -8,8 +8,10 @@ from itertools import product
 import numpy as np
 import pytest
 
+from flowborne.kernels.arrays import FREE, PERIODIC, PRESCRIBED, FaceGrid
 from flowborne.kernels.control_volumes import (
     DRIVEN,
+    Closed,
     fill_empty,
     find_targets,
     join_small,
@@ -57,10 +59,15 @@ class Case:
     small: np.ndarray
     wraps: np.ndarray
     last: tuple[slice, ...] | None
+    component: int
 
     @property
     def shape(self) -> np.ndarray:
         return np.array(self.volumes.shape)
+
+    @property
+    def faces(self) -> FaceGrid:
+        return FaceGrid(self.component, self.shape, self.wraps)
 
     @property
     def pushed(self) -> np.ndarray:
@@ -94,13 +101,11 @@ def case_of(shape: tuple, periodic: tuple, component: int, seed: int = 0) -> Cas
     if last is not None:
         closed[last] = False
     wraps = np.array(shape) * np.array(periodic)
-    return Case(cells, opened, volumes, np.flatnonzero(closed), wraps, last)
+    return Case(cells, opened, volumes, np.flatnonzero(closed), wraps, last, component)
 
 
-def targets_of(case: Case, component: int) -> tuple[np.ndarray, np.ndarray]:
-    return find_targets(
-        case.small, case.pushed, case.opened, case.volumes, case.cells, component, case.wraps
-    )
+def targets_of(case: Case) -> tuple[np.ndarray, np.ndarray]:
+    return find_targets(case.small, case.pushed, case.opened, case.volumes, case.cells, case.faces)
 
 
 @ROOM_OR_SLAB
@@ -116,7 +121,7 @@ def test_hosts(shape: tuple, periodic: tuple, component: int) -> None:
     """Found as said; those of small ones that move with one are open, and all of them is given."""
     for seed in range(20):
         case = case_of(shape, periodic, component, seed)
-        targets, parts = targets_of(case, component)
+        targets, parts = targets_of(case)
         assert parts.any()
         assert (case.opened.ravel()[targets[parts > 0.0]] > 0.0).all()
         np.testing.assert_allclose(parts.sum(axis=1)[parts.any(axis=1)], 1.0, rtol=1e-15)
@@ -133,9 +138,9 @@ def test_what_is_on_either_side_of_a_thin_body_stays_there() -> None:
     cells[1], cells[2] = 0.6, 0.2
     opened = np.array([1.0, 0.9, 0.0, 0.7, 1.0]).reshape(5, 1, 1)
     volumes = np.array([0.5, 0.8, 0.4, 0.6, 0.5]).reshape(5, 1, 1)
-    none = np.zeros(3, np.int64)
+    faces = FaceGrid(0, np.array(opened.shape), np.zeros(3, np.int64))
     pushed = (opened > 0.0).astype(np.uint8)
-    targets, parts = find_targets(np.array([2]), pushed, opened, volumes, cells, 0, none)
+    targets, parts = find_targets(np.array([2]), pushed, opened, volumes, cells, faces)
     np.testing.assert_array_equal(targets, [[1, 3]])
     np.testing.assert_allclose(parts, [[0.54 / 0.68, 0.14 / 0.68]])
 
@@ -143,11 +148,11 @@ def test_what_is_on_either_side_of_a_thin_body_stays_there() -> None:
 @ROOM_OR_SLAB
 def test_small_ones_give_to_targets(shape: tuple, periodic: tuple, component: int) -> None:
     case = case_of(shape, periodic, component)
-    targets, parts = targets_of(case, component)
+    targets, parts = targets_of(case)
     amount = np.random.default_rng(1).standard_normal(case.volumes.shape)
     merged = amount.copy()
     shares = parts * np.random.default_rng(2).uniform(size=len(parts))[:, None]
-    merge_small(merged, case.small, targets, shares)
+    merge_small(merged, Closed(case.small, targets, shares))
     expected = merge_small_reference(amount, case.small, targets, shares)
     np.testing.assert_allclose(merged, expected, atol=1e-14)
     assert merged.sum() == pytest.approx(amount.sum(), abs=1e-13 * np.abs(amount).sum())
@@ -157,13 +162,13 @@ def test_small_ones_give_to_targets(shape: tuple, periodic: tuple, component: in
 def test_small_ones_bring_what_they_hold(shape: tuple, periodic: tuple, component: int) -> None:
     """Volumes of nothing hold an amount all the same, as one that closes in a step does."""
     case = case_of(shape, periodic, component)
-    (targets, parts), volumes = targets_of(case, component), case.volumes.copy()
+    (targets, parts), volumes = targets_of(case), case.volumes.copy()
     volumes.reshape(-1)[case.small[::2]] = 0.0
     field = np.random.default_rng(1).standard_normal(volumes.shape)
     joined, merged = field.copy(), volumes.copy()
     shares = parts * np.random.default_rng(2).uniform(size=len(parts))[:, None]
     shares[::2] = parts[::2]
-    join_small(joined, merged, case.small, targets, shares, 1e-9)
+    join_small(joined, merged, Closed(case.small, targets, shares), 1e-9)
     expected, volumes_after = join_small_reference(
         field, volumes, case.small, targets, shares, 1e-9
     )
@@ -180,7 +185,7 @@ def test_empty_ones_have_the_velocity_around_them(
     case = case_of(shape, periodic, component)
     field, listed = np.random.default_rng(2).standard_normal(case.volumes.shape), case.listed(0.3)
     filled = field.copy()
-    fill_empty(filled, case.volumes, listed, 0.01, case.shape, case.wraps)
+    fill_empty(filled, case.volumes, listed, 0.01, case.faces)
     expected = fill_empty_reference(field, case.volumes, listed, 0.01, case.wraps)
     assert (filled != field).any()
     np.testing.assert_allclose(filled, expected, atol=1e-14)
@@ -199,7 +204,7 @@ def test_small_ones_mix_with_their_neighbours_and_keep_the_sum(
     mixed, nothing = field.copy(), 0.01
     leaving = np.random.default_rng(4).uniform(0.0, 0.5, listed.size)
     nought = np.zeros(case.shape)
-    level(mixed, case.volumes, listed, leaving, nought, nothing, case.shape, case.wraps)
+    level(mixed, case.volumes, listed, leaving, nought, nothing, case.faces)
     assert not nought.any()
     expected = level_reference(field, case.volumes, listed, leaving, nothing, case.wraps)
     assert (mixed != field).any()
@@ -223,7 +228,7 @@ def test_share_velocity(shape: tuple, periodic: tuple, component: int) -> None:
     shares = 0.5 * random.random((20, 2))
     field = random.standard_normal(case.shape)
     expected = share_velocity_reference(field, small, targets, shares)
-    share_velocity(field, small, targets, shares)
+    share_velocity(field, Closed(small, targets, shares))
     np.testing.assert_allclose(field, expected, rtol=1e-14, atol=1e-15)
 
 
@@ -255,7 +260,8 @@ def test_sort_faces(shape: tuple, periodic: tuple, component: int, told: tuple) 
     part = find_parts_reference(case.volumes, 0.2 * cell, component, case.wraps)
     volumes, kinds = np.empty(case.shape), np.empty(case.shape, np.uint8)
     counts, limits = np.empty((np.prod(case.shape[:2]), 3), np.int64), (cell, 0.2, slack, 0.01)
-    sort_faces(volumes, kinds, counts, case.cells, case.opened, component, prescribed, ring, limits)
+    ends = np.full(2, PERIODIC) if ring else np.where(prescribed, PRESCRIBED, FREE)
+    sort_faces(volumes, kinds, counts, case.cells, case.opened, component, ends, limits)
     np.testing.assert_array_equal(volumes, case.volumes)
     np.testing.assert_array_equal(kinds & DRIVEN, driven)
     for found, expected in zip(listed_kinds(kinds, counts), (part, shut, uneven), strict=True):
@@ -269,6 +275,6 @@ def test_a_closed_face_whose_cells_cancel_passes_on_what_it_gets() -> None:
     cells[2:4, 0, 0] = 1e-13, -1e-13
     volumes, kinds = np.empty((7, 1, 1)), np.empty((7, 1, 1), np.uint8)
     counts, limits = np.empty((7, 3), np.int64), (1.0, 0.2, 0.1, 1e-9)
-    sort_faces(volumes, kinds, counts, cells, opened, 0, np.zeros(2, np.uint8), False, limits)
+    sort_faces(volumes, kinds, counts, cells, opened, 0, np.full(2, FREE), limits)
     assert volumes[3] == 0.0
     np.testing.assert_array_equal(listed_kinds(kinds, counts)[1], (2, 3, 4))

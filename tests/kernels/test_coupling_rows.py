@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from flowborne.kernels.arrays import FREE, PRESCRIBED
 from flowborne.kernels.coupling_rows import (
     COVERED,
     ENCLOSED,
@@ -25,20 +26,23 @@ from .references.coupling_rows import (
     list_cells_reference,
 )
 
-WALLS = [np.zeros((3, 2), np.int64), np.array([[1, 0], [0, 1], [1, 1]])]
+NORMAL = [
+    np.full((3, 2), FREE),
+    np.array([[PRESCRIBED, FREE], [FREE, PRESCRIBED], [PRESCRIBED, PRESCRIBED]]),
+]
 
 
 @pytest.mark.parametrize("shape", SHAPES)
-@pytest.mark.parametrize("walls", WALLS)
-def test_kinds_of_cells(shape: tuple[int, int, int], walls: np.ndarray) -> None:
+@pytest.mark.parametrize("normal", NORMAL)
+def test_kinds_of_cells(shape: tuple[int, int, int], normal: np.ndarray) -> None:
     random = np.random.default_rng(3)
     opened = [random.random(face_shape(shape, d)) for d in range(3)]
     for fraction in opened:
         fraction[random.random(fraction.shape) < 0.7] = 0.0
-    expected = kinds_of_cells_reference(tuple(opened), walls)
-    kinds = {COVERED, NARROW, WIDE} | ({ENCLOSED} if walls.any() else set())
+    expected = kinds_of_cells_reference(tuple(opened), normal)
+    kinds = {COVERED, NARROW, WIDE} | ({ENCLOSED} if (normal == PRESCRIBED).any() else set())
     assert set(np.unique(expected)) == kinds
-    np.testing.assert_array_equal(kinds_of_cells(*opened, walls), expected)
+    np.testing.assert_array_equal(kinds_of_cells(*opened, normal), expected)
 
 
 @pytest.mark.parametrize("shape", SHAPES)
@@ -51,13 +55,10 @@ def test_list_cells(shape: tuple[int, int, int]) -> None:
     centre = tuple(random.uniform(-0.5, 0.5, (2, *values.shape)) for values in share)
     for values in centre if made.flat else ():
         values[1] = 0.0
-    given = centre, random.random(shape) < 0.5, made.box, 5, ORIGIN, H, 0.3, made.flat
-    expected = list_cells_reference(share, *given)
-    none, nothing = np.zeros(0, np.int64), np.zeros(0)
-    count = list_cells(share, *given, 0, none, none, nothing)
-    assert 0 < count == expected[0].size < inside.prod()
-    found = np.empty(count, np.int64), np.empty(6 * count, np.int64), np.empty(6 * count)
-    assert list_cells(share, *given, 0, *found) == count
+    piece = made.piece(share[0], centre[0])._replace(share=share, centre=centre)
+    listed = random.random(shape) < 0.5
+    expected, found = list_cells_reference(piece, listed), list_cells(piece, listed)
+    assert 0 < found[0].size == expected[0].size < inside.prod()
     for one, other in zip(found, expected, strict=True):
         np.testing.assert_allclose(one, other, atol=1e-14)
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from flowborne.kernels.arrays import Nodes
 from flowborne.kernels.distance import (
     BOX,
     CAPSULE,
@@ -44,7 +45,7 @@ def test_signed_distance(kind: int) -> None:
     expected = signed_distance_reference(kind, SIZE, points, *table)
     assert (expected < 0.0).any()
     assert (expected > 0.0).any()
-    found = [signed_distance(kind, SIZE, *point, *table) for point in points]
+    found = [signed_distance(kind, SIZE, tuple(point), *table) for point in points]
     np.testing.assert_allclose(found, expected, atol=1e-13)
     if kind not in (ELLIPSOID, MESH):
         np.testing.assert_allclose(distances(kind, SIZE, points), expected, atol=1e-13)
@@ -89,8 +90,9 @@ def test_a_body_of_several_geometries_at_the_nodes(shape: tuple[int, int, int]) 
     position = random.uniform(-0.5, 0.5, (count, 3))
     rotation = Rotation.random(count, random).as_matrix()
     reach, size = random.uniform(0.2, 0.4, (2, count, 3))
+    nodes = Nodes(origin, h, flat)
     for geoms in (np.arange(count), np.array([2]), np.array([1, 4])):
-        box = node_box(geoms, position, rotation, reach, origin, h, limits)
+        box = node_box(geoms, position, rotation, reach, nodes, limits)
         chosen = position[geoms], rotation[geoms], reach[geoms]
         np.testing.assert_array_equal(box, node_box_reference(*chosen, origin, h, limits))
         if flat:
@@ -115,7 +117,7 @@ def test_a_body_of_several_geometries_at_the_nodes(shape: tuple[int, int, int]) 
         for g in geoms:
             at = position[g], rotation[g]
             body = Placed(KINDS[g], size[g], *at, TABLES, TABLE, CORNER, PITCH)
-            lower_to_body(phi, box, body, origin, h, flat)
+            lower_to_body(phi, box, body, nodes)
         np.testing.assert_allclose(phi, expected, atol=1e-13)
         assert expected.max() <= BAND * h
 

@@ -5,7 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flowborne.kernels.dye import CUT, EMPTY, WHOLE, list_flows, pass_on, sort_cells, sweep
+from flowborne.kernels.dye import (
+    CUT,
+    EMPTY,
+    WHOLE,
+    CutCells,
+    list_flows,
+    pass_on,
+    sort_cells,
+    sweep,
+)
 
 from .references.cut_dye import beside_reference, pass_on_reference, sort_cells_reference
 from .references.dye import bend_reference, sweep_reference
@@ -34,8 +43,7 @@ def test_sweep(shape: tuple[int, int, int], wraps: bool, bounds: tuple[float, fl
     ends = random.uniform(0.3, 0.7, (2, shape[0], shape[2]))
     clear = (random.random(shape) < 0.8).astype(np.uint8)
     expected = sweep_reference(field, volume, flux, clear, ends, wraps, 0.9, *bounds)
-    crossed = np.zeros(ends.shape)
-    sweep(field, volume, flux, clear, ends, wraps, 0.9, *bounds, crossed)
+    crossed = sweep(field, volume, flux, clear, ends, wraps, 0.9, bounds)
     for given, value in zip((field, volume, crossed), expected, strict=True):
         np.testing.assert_allclose(given, value, atol=1e-14)
 
@@ -46,9 +54,9 @@ def test_means_of_a_parabola_are_carried_exactly(courant: float) -> None:
     x = np.arange(13.0)
     whole = 2.0 * x + 3.0 * x**2 + 0.1 * x**3 / 3.0
     field = np.diff(whole).reshape(1, 12, 1)
-    flux, crossed = np.full((1, 13, 1), courant), np.zeros((2, 1, 1))
-    clear, ends = np.ones(field.shape, np.uint8), np.zeros(crossed.shape)
-    sweep(field, np.ones(field.shape), flux, clear, ends, False, 1.0, *NEVER, crossed)
+    flux = np.full((1, 13, 1), courant)
+    clear, ends = np.ones(field.shape, np.uint8), np.zeros((2, 1, 1))
+    sweep(field, np.ones(field.shape), flux, clear, ends, False, 1.0, NEVER)
     moved = x[3:10] - courant
     exact = np.diff(2.0 * moved + 3.0 * moved**2 + 0.1 * moved**3 / 3.0)
     np.testing.assert_allclose(field[0, 3:9, 0], exact, rtol=1e-13)
@@ -66,51 +74,46 @@ def test_parabolas_stay_between_their_neighbours_but_for_smooth_extrema() -> Non
     assert low[2] == high[2] == 0.0
 
 
-def sample() -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray]:
+def sample() -> tuple[CutCells, np.ndarray, np.ndarray]:
     """A room that is periodic along x with some cut cells: its tables, its fluxes and volumes."""
     random = np.random.default_rng(4)
     fluxes = flows(ROOM, random)
     fluxes[0][-1] = fluxes[0][0]
     listed = np.flatnonzero(random.random(ROOM) < 0.3)
     wraps, shape = np.array([ROOM[0], 0, 0]), np.array(ROOM)
-    tables = {
-        "listed": listed,
-        "beside": np.full((listed.size, 6), -1),
-        "row": np.full((listed.size, 6), -1),
-        "out": np.zeros((listed.size, 6)),
-    }
+    unknown = np.full((2, listed.size, 6), -1)
+    cells = CutCells(listed, *unknown, np.zeros((listed.size, 6)))
     kept = [flux.copy() for flux in fluxes]
     for axis in range(3):
-        rest = (tables[name] for name in ("beside", "row", "out"))
-        list_flows(listed, axis, fluxes[axis], wraps, shape, *rest)
+        list_flows(cells, axis, fluxes[axis], wraps, shape)
     beside, row = beside_reference(listed, shape, wraps)
-    np.testing.assert_array_equal(tables["beside"], beside)
-    np.testing.assert_array_equal(tables["row"], row)
+    np.testing.assert_array_equal(cells.beside, beside)
+    np.testing.assert_array_equal(cells.row, row)
     gone = (np.diff(was - q, axis=a) for a, (was, q) in enumerate(zip(kept, fluxes, strict=True)))
     net = sum(gone, np.zeros(ROOM))
-    return tables, net, np.array([np.count_nonzero(q) for q in fluxes])
+    return cells, net, np.array([np.count_nonzero(q) for q in fluxes])
 
 
 def test_fluxes_of_cut_cells_are_listed_and_taken_out() -> None:
     """What leaves through all faces of a cut cell is what its fluxes were."""
-    tables, net, left = sample()
-    np.testing.assert_allclose(tables["out"].sum(axis=1), net.ravel()[tables["listed"]], atol=1e-15)
+    cells, net, left = sample()
+    np.testing.assert_allclose(cells.out.sum(axis=1), net.ravel()[cells.listed], atol=1e-15)
     assert left.min() > 0
 
 
 def test_pass_on() -> None:
     random = np.random.default_rng(5)
-    tables, _, _ = sample()
-    n = tables["listed"].size
+    cells, _, _ = sample()
+    n = cells.listed.size
     field, volume = random.random(ROOM), np.ones(ROOM)
-    volume.ravel()[tables["listed"]] = random.choice([0.0, 1e-6, 0.3, 0.7], n)
+    volume.ravel()[cells.listed] = random.choice([0.0, 1e-6, 0.3, 0.7], n)
     gain = random.random(n) * (random.random(n) < 0.2)
     local = random.uniform(-0.1, 0.1, n) * (random.random(n) < 0.2)
-    short = volume.ravel()[tables["listed"]] + gain + local - tables["out"].sum(axis=1)
-    volume.ravel()[tables["listed"]] -= np.minimum(short, 0.0)
+    short = volume.ravel()[cells.listed] + gain + local - cells.out.sum(axis=1)
+    volume.ravel()[cells.listed] -= np.minimum(short, 0.0)
     given = random.random((n, 6)), gain, gain * random.random(n), local
-    expected = pass_on_reference(field, volume, *tables.values(), *given)
-    gained = pass_on(field, volume, *tables.values(), *given, *NEVER)
+    expected = pass_on_reference(field, volume, *cells, *given)
+    gained = pass_on(field, volume, cells, *given, NEVER)
     assert gained == pytest.approx(expected[2], abs=1e-13)
     np.testing.assert_allclose(volume, expected[1], atol=1e-14)
     filled = volume > 1e-9
@@ -123,8 +126,7 @@ def test_sort_cells() -> None:
     before, after = random.choice([0.0, 0.4, 0.995, 1.0], (2, *ROOM))
     rate = random.random(ROOM) * (random.random(ROOM) < 0.1)
     fluxes = [q * (random.random(q.shape) < 0.3) for q in flows(ROOM, random)]
-    kind, fullest = np.empty(ROOM, np.uint8), np.empty(ROOM[0])
-    sort_cells(kind, fullest, before, after, rate, *fluxes, 0.99)
+    kind, fullest = sort_cells(before, after, rate, tuple(fluxes), 0.99)
     expected = sort_cells_reference(before, after, rate, *fluxes, 0.99)
     np.testing.assert_array_equal(kind, expected[0])
     np.testing.assert_allclose(fullest, expected[1], atol=1e-15)

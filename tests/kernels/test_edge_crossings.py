@@ -7,6 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from flowborne.fluid.grid import Array
+from flowborne.kernels.arrays import Nodes
 from flowborne.kernels.edge_crossings import (
     PIECES,
     Crossings,
@@ -41,10 +42,10 @@ def placed(shape: Primitive, middle: Array, turn: Array) -> Placed:
 def crossed(body: Placed, origin: Array) -> tuple[Array, Crossings]:
     """Distances at the nodes, and where edges cross a geometry."""
     phi = np.full((NODES,) * 3, np.inf)
-    lower_to_body(phi, BOX, body, origin, H, False)
+    lower_to_body(phi, BOX, body, Nodes(origin, H, False))
     found = new_crossings(phi, H, False)
     used = np.zeros(1, np.int64)
-    cross_geometry(found, used, phi, BOX, body, 0, origin, H, False)
+    cross_geometry(found, used, phi, BOX, body, 0, Nodes(origin, H, False))
     assert 100 < used[0] <= found.part.size
     return phi, found._replace(piece=found.piece[: used[0]])
 
@@ -101,11 +102,12 @@ def test_crossings_of_a_mesh_are_those_of_its_geometry(flat: bool) -> None:
         turn = turn if flat else Rotation.random(random_state=PLACES).as_matrix()
         origin = -H * (0.5 * NODES + PLACES.random(3))
         body, phi = placed(shape, np.zeros(3), turn), np.full(box[:, 1], np.inf)
-        lower_to_body(phi, box, body, origin, H, flat)
+        nodes = Nodes(origin, H, flat)
+        lower_to_body(phi, box, body, nodes)
         one, other = new_crossings(phi, H, flat), new_crossings(phi, H, flat)
-        cross_geometry(one, np.zeros(1, np.int64), phi, box, body, 0, origin, H, flat)
-        skin = mesh.vertices @ turn.T, mesh.faces, sheets, 3
-        cross_skin(other, np.zeros(1, np.int64), phi, *skin, box, origin, H, flat)
+        cross_geometry(one, np.zeros(1, np.int64), phi, box, body, 0, nodes)
+        skin = mesh.vertices @ turn.T, mesh.faces, 3 * PIECES + sheets
+        cross_skin(other, np.zeros(1, np.int64), phi, *skin, box, nodes)
         both = (one.at >= 0) & (other.at >= 0)
         for n in other.at[(other.at >= 0) & ~both]:  # an edge of the box grazes the edge
             assert other.part[n] + other.part[n + 1] > 0.999
@@ -142,7 +144,7 @@ def test_a_crossing_at_the_node_inside_has_its_normal() -> None:
     phi[9, 6, 6] = -1e-18
     found = new_crossings(phi, H, False)
     found.normal[:] = np.nan
-    cross_geometry(found, np.zeros(1, np.int64), phi, BOX, ball, 0, origin, H, False)
+    cross_geometry(found, np.zeros(1, np.int64), phi, BOX, ball, 0, Nodes(origin, H, False))
     n = found.at[0, 9, 6, 6]
     assert found.part[n] == pytest.approx(1.0)
     np.testing.assert_allclose(found.normal[n], [1.0, 0.0, 0.0], atol=1e-9)

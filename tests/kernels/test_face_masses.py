@@ -8,7 +8,8 @@ import pytest
 from flowborne import Grid
 from flowborne.fluid.control_volumes import ControlVolumes, control_volumes
 from flowborne.kernels.control_volumes import Transfers
-from flowborne.kernels.face_masses import add_transfers, even_out
+from flowborne.kernels.face_masses import Openings, add_transfers, even_out
+from flowborne.kernels.flux import Stage
 from flowborne.worlds import Boundaries, cut_by_bodies, make_world
 from flowborne_validation.worlds import RING, mjcf
 
@@ -66,23 +67,26 @@ def test_what_moves_with_faces_is_near_their_opening_and_all_there_is(
 def test_in_a_ring_of_equal_openings_each_gets_the_mean_excess_of_both_beside_it() -> None:
     held, whole = np.array([1.3, 1.0, 1.1]), np.ones(3)
     given, gained = np.zeros(3), np.zeros(3)
-    even_out(held, whole, whole, np.array([1, 2, 0]), whole, np.zeros(3), 1.0, given, gained)
+    between = Openings(np.array([1, 2, 0]), whole, np.zeros(3))
+    even_out(held, whole, whole, between, 1.0, given, gained)
     np.testing.assert_allclose(held + gained, [1.05, 1.2, 1.15])
     np.testing.assert_allclose(given, [0.15, -0.05, -0.1], atol=1e-15)
 
 
 def test_what_is_even_for_each_part_of_its_opening_stays() -> None:
     held, goal = np.array([0.22, 0.77, 0.11]), np.array([0.2, 0.7, 0.1])
-    above, way, gained = np.array([1, 2, -1]), np.array([0.3, 0.5, 0.0]), np.zeros(3)
-    even_out(held, goal, goal, above, way, np.zeros(3), 1.0, np.zeros(3), gained)
+    gained = np.zeros(3)
+    between = Openings(np.array([1, 2, -1]), np.array([0.3, 0.5, 0.0]), np.zeros(3))
+    even_out(held, goal, goal, between, 1.0, np.zeros(3), gained)
     np.testing.assert_allclose(gained, 0.0, atol=1e-15)
 
 
 def test_one_keeps_half_of_what_its_opening_says() -> None:
     """Beside a wide one that lacks as much as there is."""
     held, goal, opened = np.array([0.3, 0.1]), np.array([0.2, 1.0]), np.array([0.2, 1.0])
-    above, way, gained = np.array([1, -1]), np.array([1.0, 0.0]), np.zeros(2)
-    even_out(held, goal, opened, above, way, np.zeros(2), 1.0, np.zeros(2), gained)
+    gained = np.zeros(2)
+    between = Openings(np.array([1, -1]), np.array([1.0, 0.0]), np.zeros(2))
+    even_out(held, goal, opened, between, 1.0, np.zeros(2), gained)
     assert held[0] + gained[0] == pytest.approx(0.1)
 
 
@@ -92,7 +96,7 @@ def test_transfers_change_no_energy() -> None:
     velocity, rate = random.standard_normal(9), random.standard_normal(20)
     givers, takers = random.integers(0, 9, (2, 20))
     leaving, later, given = np.zeros(9), np.zeros(9), Transfers(givers, takers, rate)
-    add_transfers(later, leaving, np.full(9, 2.0), velocity, given, 0.3, 0.0)
+    add_transfers(Stage(later, leaving, np.full(9, 2.0), 0.5, 0.6, 0.0), velocity, given)
     np.testing.assert_allclose(later, -0.15 * leaving, atol=1e-15)
     volume = np.zeros(9)
     np.add.at(volume, givers, rate)

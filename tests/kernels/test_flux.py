@@ -6,7 +6,18 @@ import numpy as np
 import pytest
 
 from flowborne.fluid.transport import neighbours
-from flowborne.kernels.flux import CLEAR, CUT, GHOSTS, UPSTREAM, largest_crossing, pad_field, stage
+from flowborne.kernels.flux import (
+    CLEAR,
+    CUT,
+    GHOSTS,
+    UPSTREAM,
+    Fluxes,
+    Padded,
+    Stage,
+    largest_crossing,
+    pad_field,
+    stage,
+)
 
 from .cut_cells import face_shape
 from .references.flux import largest_crossing_reference, side_fluxes_reference, stage_reference
@@ -31,8 +42,9 @@ def net_of(field: np.ndarray, marks: np.ndarray, q: tuple, component: int) -> np
     """What leaves each control volume per time."""
     shape = face_shape((q[1].shape[0], q[0].shape[1], q[0].shape[2]), component)
     nothing, net = np.zeros(shape), np.full(shape, np.nan)
-    sides = neighbours(shape[component], periodic=False)
-    stage(np.empty(shape), net, 1.0, *[nothing] * 3, 1.0, 1e-9, field, marks, q, component, *sides)
+    flux = Fluxes(q, component, *neighbours(shape[component], periodic=False))
+    now = Stage(np.empty(shape), net, nothing, 1.0, 1.0, 1e-9)
+    stage(now, nothing, nothing, Padded(field, marks), flux)
     return net
 
 
@@ -49,16 +61,17 @@ def test_stage(
     marks = random.choice(np.array(marked, np.uint8), padded(shape))
     start, before, after, net = random.standard_normal((4, *shape))
     after[after < 0.3] = 0.0
-    sides = neighbours(shape[component], periodic)
-    rest = 0.3, 1e-9, field, marks, fluxes(cells, random), component, *sides
-    value, total = stage_reference(net, weight, start, before, after, *rest)
+    flux = Fluxes(fluxes(cells, random), component, *neighbours(shape[component], periodic))
+    rest = start, before, Padded(field, marks), flux
     out = np.full(shape, np.nan)
-    stage(out, net, weight, start, before, after, *rest)
+    now = Stage(out, net, after, weight, 0.3, 1e-9)
+    value, total = stage_reference(now, *rest)
+    stage(now, *rest)
     if weight == 1.0:
         np.testing.assert_allclose(net, total, atol=1e-13)
     np.testing.assert_allclose(out, value, rtol=1e-12, atol=1e-12)
     again = np.full(shape, np.nan)
-    stage.parallel(again, net if weight < 1.0 else total, weight, start, before, after, *rest)
+    stage.parallel(now._replace(later=again, net=net if weight < 1.0 else total), *rest)
     np.testing.assert_array_equal(again, out)
 
 
@@ -69,8 +82,8 @@ def test_sides_of_a_control_volume(cells: Shape, component: int, periodic: bool)
     q = fluxes(cells, np.random.default_rng(2))
     if periodic:
         np.moveaxis(q[component], component, 0)[-1] = np.moveaxis(q[component], component, 0)[0]
-    sides = neighbours(cells[component] + 1, periodic)
-    through = side_fluxes_reference(q, component, *sides)
+    means = neighbours(cells[component] + 1, periodic)
+    through = side_fluxes_reference(Fluxes(q, component, *means))
     inward = sum(np.diff(flux, axis=axis) for axis, flux in enumerate(q))
     ends = [(int(axis == component),) * 2 for axis in range(3)]
     wide = np.moveaxis(np.pad(inward, ends, mode="wrap" if periodic else "constant"), component, 0)
@@ -85,7 +98,8 @@ def test_a_uniform_field_leaves_with_the_volume(cells: Shape, component: int) ->
     marks = random.integers(0, 3, padded(shape)).astype(np.uint8)
     q = fluxes(cells, random)
     net = net_of(np.full(padded(shape), 0.7), marks, q, component)
-    through = side_fluxes_reference(q, component, *neighbours(shape[component], periodic=False))
+    means = neighbours(shape[component], periodic=False)
+    through = side_fluxes_reference(Fluxes(q, component, *means))
     volume = sum(np.diff(g, axis=axis) for axis, g in enumerate(through))
     np.testing.assert_allclose(net, 0.7 * volume, atol=1e-13)
 

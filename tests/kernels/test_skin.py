@@ -10,7 +10,7 @@ import pyvista as pv
 
 from flowborne.fluid.grid import Array, Grid
 from flowborne.kernels.arrays import Integers
-from flowborne.kernels.closed_fractions import close_faces
+from flowborne.kernels.closed_fractions import Piece, close_faces
 from flowborne.kernels.cut_faces import nodes_inside
 from flowborne.kernels.edge_crossings import new_crossings
 from flowborne.kernels.node_distance import BAND
@@ -70,12 +70,12 @@ def together(*skins: Skin) -> Skin:
 
 
 def box_of(skin: Skin, grid: Grid) -> Integers:
-    return skin_box(skin[0], np.array(grid.origin), grid.spacing, np.array(grid.shape))
+    return skin_box(skin[0], grid.nodes, np.array(grid.shape))
 
 
 def sample(skin: Skin, grid: Grid, box: Integers) -> tuple[Array, Array]:
     """Distances, and whether the skin is within BAND cells."""
-    phi = sample_skin(*skin, box, np.array(grid.origin), grid.spacing, grid.is_slab, BAND)
+    phi = sample_skin(*skin, box, grid.nodes, BAND)
     return phi, np.abs(phi) < BAND * grid.spacing
 
 
@@ -313,7 +313,8 @@ def test_closed_area_of_a_sphere_is_second_order(axis: int) -> None:
             total = np.zeros(grid.face_shape(axis))
             own = np.empty(np.array(phi.shape) - 1 + (np.arange(3) == axis))
             crossings, centre = new_crossings(phi, grid.spacing, False), np.zeros((2, *own.shape))
-            close_faces(own, centre, total, phi, crossings, box, axis, False)
+            piece = Piece(0, box, grid.nodes, phi, crossings, (own,) * 3, (centre,) * 3)
+            close_faces(piece, total, axis)
             place = grid.face_coordinates(axis)[axis]
             middle = int(np.argmin(np.abs(place)))
             area = h**2 * np.take(total, middle, axis).sum()

@@ -7,13 +7,14 @@ import itertools
 import numpy as np
 import pytest
 
-from flowborne.kernels.arrays import CLOSED, OPEN, PERIODIC
+from flowborne.kernels.arrays import FREE, PERIODIC, PRESCRIBED
 from flowborne.kernels.edge_crossings import new_crossings
 from flowborne.kernels.viscosity import (
     GIVEN,
     INACTIVE,
     TIED,
     UNKNOWN,
+    CutFaces,
     apply_component,
     classify,
     face_distances,
@@ -33,43 +34,43 @@ from .references.viscosity import (
 from .references.viscous_operator import apply_component_reference
 
 CODES = [
-    np.full((3, 2), CLOSED),
-    np.array([[PERIODIC, PERIODIC], [OPEN, CLOSED], [PERIODIC, PERIODIC]]),
-    np.array([[OPEN, OPEN], [PERIODIC, PERIODIC], [CLOSED, OPEN]]),
+    np.full((3, 2), PRESCRIBED),
+    np.array([[PERIODIC, PERIODIC], [FREE, PRESCRIBED], [PERIODIC, PERIODIC]]),
+    np.array([[FREE, FREE], [PERIODIC, PERIODIC], [PRESCRIBED, FREE]]),
 ]
 CASES = [
-    (shape, codes, axis)
-    for shape, codes in itertools.product(SHAPES, CODES)
+    (shape, normal, axis)
+    for shape, normal in itertools.product(SHAPES, CODES)
     for axis in range(3 if shape[2] > 1 else 2)
 ]
 
 
-def kinds(shape: tuple[int, int, int], codes: np.ndarray, axis: int) -> tuple:
+def kinds(shape: tuple[int, int, int], normal: np.ndarray, axis: int) -> tuple:
     """The cut grid, centres, open parts of the cells and kinds; some open faces inside are
     prescribed."""
     made = cut(shape)
-    kind = classify_reference(made.opened[axis], axis, codes, 0.3)
+    kind = classify_reference(made.opened[axis], axis, normal, 0.3)
     random = np.random.default_rng(1)
     kind[(kind == UNKNOWN) & (random.random(kind.shape) < 0.1)] = GIVEN
     parts = random.random(shape) * (random.random(shape) < 0.9)
     return made, find_centres_reference(made.distance, axis), parts, kind
 
 
-@pytest.mark.parametrize(("shape", "codes", "axis"), CASES)
-def test_distances_and_kinds(shape: tuple, codes: np.ndarray, axis: int) -> None:
+@pytest.mark.parametrize(("shape", "normal", "axis"), CASES)
+def test_distances_and_kinds(shape: tuple, normal: np.ndarray, axis: int) -> None:
     made = cut(shape)
     phi = np.empty(face_shape(shape, axis))
     face_distances(made.distance, axis, phi)
     np.testing.assert_allclose(phi, face_distances_reference(made.distance, axis), atol=1e-15)
     kind = np.empty(phi.shape, np.uint8)
-    classify(kind, made.opened[axis], axis, codes, 0.3)
-    expected = classify_reference(made.opened[axis], axis, codes, 0.3)
+    classify(kind, made.opened[axis], axis, normal, 0.3)
+    expected = classify_reference(made.opened[axis], axis, normal, 0.3)
     assert {INACTIVE, UNKNOWN, TIED} <= set(np.unique(expected))
     np.testing.assert_array_equal(kind, expected)
 
 
-@pytest.mark.parametrize(("shape", "codes", "axis"), CASES)
-def test_centres(shape: tuple, codes: np.ndarray, axis: int) -> None:
+@pytest.mark.parametrize(("shape", "normal", "axis"), CASES)
+def test_centres(shape: tuple, normal: np.ndarray, axis: int) -> None:
     made = cut(shape)
     centre = np.zeros((2, *face_shape(shape, axis)))
     near = np.arange(centre[0].size)
@@ -79,17 +80,17 @@ def test_centres(shape: tuple, codes: np.ndarray, axis: int) -> None:
     np.testing.assert_allclose(centre, expected, atol=1e-10)
 
 
-@pytest.mark.parametrize(("shape", "codes", "axis"), CASES)
-def test_links(shape: tuple, codes: np.ndarray, axis: int) -> None:
-    made, centre, parts, kind = kinds(shape, codes, axis)
+@pytest.mark.parametrize(("shape", "normal", "axis"), CASES)
+def test_links(shape: tuple, normal: np.ndarray, axis: int) -> None:
+    made, centre, parts, kind = kinds(shape, normal, axis)
     velocity = np.random.default_rng(2).standard_normal(kind.shape)
     for d in range(2 if made.flat else 3):
-        periodic = bool(codes[d, 0] == PERIODIC)
+        periodic = bool(normal[d, 0] == PERIODIC)
         grid = made.distance, made.opened[axis], centre, parts
         edges = made.distance, made.crossings
         found = [np.zeros(kind.shape) for _ in range(3)]
-        near = np.full(kind.shape, -1.0)
-        link_faces(axis, d, kind, near, *edges, *grid[1:], velocity, 0.7, *found, periodic)
+        near, faces = np.full(kind.shape, -1.0), CutFaces(axis, kind, *edges, *grid[1:], 0.7)
+        link_faces(faces, d, near, velocity, *found, periodic)
         expected = link_faces_reference(axis, d, kind, *grid, velocity, 0.7, periodic)
         for one, other in zip(found, expected, strict=True):
             assert other.any()
@@ -103,21 +104,20 @@ def test_links_of_uncut_faces_need_no_geometry() -> None:
     cuts = nothing, np.full((2, 6, 4, 3), np.nan), np.full(shape, np.nan)
     for d in range(3):
         diagonal, link, given = (np.zeros(kind.shape) for _ in range(3))
-        link_faces(0, d, kind, away, *edges, *cuts, away, 0.7, diagonal, link, given, False)
+        faces = CutFaces(0, kind, *edges, *cuts, 0.7)
+        link_faces(faces, d, away, away, diagonal, link, given, False)
         assert set(np.unique(link)) == {0.0, 0.7}
         np.testing.assert_array_equal(np.moveaxis(link, d, 0)[:-1], 0.7)
 
 
-@pytest.mark.parametrize(("shape", "codes", "axis"), CASES)
-def test_walls(shape: tuple, codes: np.ndarray, axis: int) -> None:
-    made, centre, parts, kind = kinds(shape, codes, axis)
+@pytest.mark.parametrize(("shape", "normal", "axis"), CASES)
+def test_walls(shape: tuple, normal: np.ndarray, axis: int) -> None:
+    made, centre, parts, kind = kinds(shape, normal, axis)
     beside = np.flatnonzero(kind == UNKNOWN)
     grid = made.distance, made.opened[axis], centre, parts
-    wall, node = np.zeros((beside.size, 3)), np.zeros((beside.size, 3), np.int64)
-    gap, place = np.zeros((2, beside.size, 3, 3))
-    edges = made.distance, made.crossings
-    meet_walls(axis, kind, *edges, *grid[1:], 0.7, codes, beside, wall, gap, place, node)
-    expected = meet_walls_reference(axis, kind, *grid, 0.7, codes, beside)
+    faces = CutFaces(axis, kind, made.distance, made.crossings, *grid[1:], 0.7)
+    wall, gap, place, node = meet_walls(faces, normal, beside)
+    expected = meet_walls_reference(axis, kind, *grid, 0.7, normal, beside)
     assert (np.abs(wall) > 0.0).any(axis=0).all()
     np.testing.assert_allclose(wall, expected[0], rtol=1e-9, atol=1e-13)
     np.testing.assert_allclose(gap, expected[1], rtol=1e-9, atol=1e-12)
@@ -126,19 +126,19 @@ def test_walls(shape: tuple, codes: np.ndarray, axis: int) -> None:
     np.testing.assert_array_equal(node[there], expected[3][there])
 
 
-@pytest.mark.parametrize(("shape", "codes", "axis"), CASES)
-def test_apply_component(shape: tuple, codes: np.ndarray, axis: int) -> None:
+@pytest.mark.parametrize(("shape", "normal", "axis"), CASES)
+def test_apply_component(shape: tuple, normal: np.ndarray, axis: int) -> None:
     """No links beyond the domain, and none from a face that stands twice."""
     random, size = np.random.default_rng(3), face_shape(shape, axis)
     links, wraps = random.random((3, *size)), np.zeros(3, np.int64)
     for d in range(3):
         along = np.moveaxis(links[d], d, 0)
-        if codes[d, 0] == PERIODIC:
+        if normal[d, 0] == PERIODIC:
             wraps[d] = shape[d]
             along[shape[d] :] = 0.0
         else:
             along[-1] = 0.0
-        if codes[axis, 0] == PERIODIC:
+        if normal[axis, 0] == PERIODIC:
             np.moveaxis(links[d], axis, 0)[-1] = 0.0
     x, scale = random.standard_normal(links[0].size), random.random(links[0].size)
     out = np.empty_like(x)

@@ -14,30 +14,13 @@ import numpy as np
 from flowborne.coupling.images import displaced
 from flowborne.coupling.shapes import WATERTIGHT
 from flowborne.fluid.boundary import Boundaries
-from flowborne.fluid.grid import Array, Grid
+from flowborne.fluid.grid import Array, Grid, faces_of
 from flowborne.kernels.arrays import Integers
-from flowborne.kernels.edge_crossings import Crossings, new_crossings
+from flowborne.kernels.closed_fractions import Piece
+from flowborne.kernels.edge_crossings import PIECES, Crossings, new_crossings
 from flowborne.kernels.node_distance import BAND
 from flowborne.kernels.skin import cross_skin, sample_skin, skin_box, skin_weights
 from flowborne.solids.flesh import Flesh
-
-
-@dataclass(frozen=True)
-class Piece:
-    """A body or flesh, or an image of it, on the grid.
-
-    body       its number
-    grid       displaced such that the body itself is there
-    box        (3, 2) ranges of nodes
-    distance   to it at these nodes, m
-    crossings  of edges between them
-    """
-
-    body: int
-    grid: Grid
-    box: Integers
-    distance: Array
-    crossings: Crossings
 
 
 @dataclass(frozen=True)
@@ -56,6 +39,18 @@ class Skins:
     triangles: Integers
 
 
+def piece_of(body: int, grid: Grid, box: Integers, phi: Array, crossings: Crossings) -> Piece:
+    """A body, or an image of it, on the grid, as yet without what it closes.
+
+    grid  displaced such that the body itself is there
+    """
+    inside = box[:, 1] - box[:, 0] - 1
+    sizes = [inside + (np.arange(3) == d) for d in range(3)]
+    share = faces_of([np.zeros(size) for size in sizes])
+    centre = faces_of([np.zeros((2, *size)) for size in sizes])
+    return Piece(body, box, grid.nodes, phi, crossings, share, centre)
+
+
 def skins_on(
     grid: Grid, sides: Boundaries, flesh: Flesh | None, vertices: Array, bodies: int
 ) -> Skins:
@@ -72,21 +67,17 @@ def skins_on(
         middles.append(0.5 * (low + high))
         more = max(0.0, 0.5 * (thinnest - flesh.thickness[f]))
         for image in displaced(grid, sides, low, high):
-            origin = np.array(image.origin)
-            box = skin_box(inside, origin, grid.spacing, np.array(grid.shape))
+            box = skin_box(inside, image.nodes, np.array(grid.shape))
             if grid.is_slab:
                 box[2] = 0, 2
             if np.any(box[:, 1] - box[:, 0] < 2):
                 continue
-            phi = sample_skin(vertices, triangles, box, origin, grid.spacing, grid.is_slab, BAND)
+            phi = sample_skin(vertices, triangles, box, image.nodes, BAND)
             found = new_crossings(phi, grid.spacing, grid.is_slab)
             if more == 0.0:
-                skin = vertices, triangles, flesh.sheets[own], -1 - f
-                cross_skin(
-                    found, np.zeros(1, np.int64), phi, *skin, box, origin, grid.spacing,
-                    grid.is_slab,
-                )  # fmt: skip
-            pieces.append(Piece(bodies + f, grid, box, phi - more, found))
+                skin = vertices, triangles, (-1 - f) * PIECES + flesh.sheets[own]
+                cross_skin(found, np.zeros(1, np.int64), phi, *skin, box, image.nodes)
+            pieces.append(piece_of(bodies + f, grid, box, phi - more, found))
     return Skins(tuple(pieces), np.array(middles), vertices, flesh.surface)
 
 

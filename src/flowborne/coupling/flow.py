@@ -28,6 +28,7 @@ from flowborne.fluid.ghosts import edge, impose_sides
 from flowborne.fluid.grid import Array, Faces, faces_of
 from flowborne.fluid.projection import accelerated
 from flowborne.fluid.transport import Transport, carry_component, damp_eddies
+from flowborne.kernels.arrays import PERIODIC
 from flowborne.kernels.faces import changes_of_step, still_to_come
 from flowborne.solids.dynamics import Kinematics
 
@@ -103,7 +104,7 @@ def advect_momentum(start: Departure, velocity: Faces, transport: Transport) -> 
         u = arrived[place.axis]
         before = u[place.layer].copy()
         side.impose(u, place, transport.time + dt)
-        if not side.joined:
+        if side.normal != PERIODIC:
             mass = fluid.density * transport.after.moving[place.axis][place.layer]
             stopped[place.axis] += float((mass * (u[place.layer] - before)).sum())
     return AdvectionResult(

@@ -7,18 +7,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flowborne.coupling.flesh import Piece, Skins, face_centres, skin_at
+from flowborne.coupling.flesh import Skins, face_centres, piece_of, skin_at
 from flowborne.coupling.images import Images, displaced, periods
 from flowborne.coupling.overlaps import handed_on
 from flowborne.coupling.shapes import Shapes
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.ghosts import edge
-from flowborne.fluid.grid import Array, Faces, Grid, faces_of
-from flowborne.kernels.arrays import CLOSED, Integers, Mask, Rows
+from flowborne.fluid.grid import Array, Faces, Grid
+from flowborne.kernels.arrays import PRESCRIBED, Integers, Mask, Rows
 from flowborne.kernels.closed_fractions import (
+    Piece,
     close_faces,
     count_beside,
-    list_closed,
     open_cells,
     share_closed,
 )
@@ -32,6 +32,7 @@ from flowborne.kernels.coupling_rows import (
 )
 from flowborne.kernels.cut_faces import other_axes
 from flowborne.kernels.edge_crossings import (
+    PIECES,
     Crossings,
     Placed,
     cross_geometry,
@@ -86,19 +87,11 @@ class Geometry:
     images: Images
 
 
-def beside_sides(shape: Integers, walls: Integers) -> Integers:
-    """(nx, ny, nz) how many solid sides bound each cell.
-
-    walls  (3, 2) 1 where the lower or upper side across an axis is solid or an inflow
-    """
-    beside = np.zeros(shape, np.int64)
-    beside[0] += walls[0, 0]
-    beside[-1] += walls[0, 1]
-    beside[:, 0] += walls[1, 0]
-    beside[:, -1] += walls[1, 1]
-    if shape[2] > 1:
-        beside[:, :, 0] += walls[2, 0]
-        beside[:, :, -1] += walls[2, 1]
+def beside_sides(grid: Grid, boundaries: Boundaries) -> Integers:
+    """(nx, ny, nz) how many sides that prescribe the flux bound each cell."""
+    beside = np.zeros(grid.shape, np.int64)
+    for place, side in boundaries.around(grid):
+        beside[place.layer] += side.normal == PRESCRIBED
     return beside
 
 
@@ -119,8 +112,7 @@ def around_bodies(
     for body in np.unique(shapes.body):
         geoms = np.flatnonzero(shapes.body == body)
         for image in displaced(grid, boundaries, *boxes[body]):
-            origin = np.array(image.origin)
-            box = node_box(geoms, position, rotation, shapes.reach, origin, grid.spacing, shape)
+            box = node_box(geoms, position, rotation, shapes.reach, image.nodes, shape)
             if grid.is_slab:
                 box[2] = 0, 2
             if np.all(box[:, 1] - box[:, 0] >= 2):
@@ -138,13 +130,14 @@ def piece_of_body(
     for g in skinned:
         np.minimum(phi, skin_distance(shapes, placed, g, box, grid), out=phi)
     found = new_crossings(phi, grid.spacing, grid.is_slab)
-    used, on = np.zeros(1, np.int64), (np.array(grid.origin), grid.spacing, grid.is_slab)
+    used = np.zeros(1, np.int64)
     for g in plain:
-        cross_geometry(found, used, phi, box, placed[g], int(g), *on)
+        cross_geometry(found, used, phi, box, placed[g], int(g), grid.nodes)
     for g in skinned:
-        skin = at_place(shapes, placed, g), shapes.skins[g][1], shapes.pieces[g], int(g)
-        cross_skin(found, used, phi, *skin, box, *on)
-    return Piece(body, grid, box, phi, found)
+        pieces = int(g) * PIECES + shapes.pieces[g]
+        skin = at_place(shapes, placed, g), shapes.skins[g][1], pieces
+        cross_skin(found, used, phi, *skin, box, grid.nodes)
+    return piece_of(body, grid, box, phi, found)
 
 
 def body_boxes(shapes: Shapes, position: Array, rotation: Array, bodies: int) -> Array:
@@ -167,7 +160,7 @@ def sampled(placed: list[Placed], geoms: Integers, box: Integers, grid: Grid) ->
     """(box shape) distance to the nearest of some geometries at the nodes of a box, m."""
     phi = np.full(box[:, 1] - box[:, 0], BAND * grid.spacing)
     for g in geoms:
-        lower_to_body(phi, box, placed[g], np.array(grid.origin), grid.spacing, grid.is_slab)
+        lower_to_body(phi, box, placed[g], grid.nodes)
     return phi
 
 
@@ -186,7 +179,7 @@ def skin_distance(
     """
     vertices, faces = at_place(shapes, placed, geom), shapes.skins[geom][1]
     band, h = BAND if grid.is_slab else NEAR, grid.spacing
-    near = sample_skin(vertices, faces, box, np.array(grid.origin), h, grid.is_slab, band)
+    near = sample_skin(vertices, faces, box, grid.nodes, band)
     if grid.is_slab:
         return near
     far = sampled(placed, np.array([geom]), box, grid)
@@ -210,13 +203,12 @@ def geometry(
     skins, first_skin   of the fleshes, and the number of bodies
     """
     nx, ny, nz = grid.shape
-    shape, flat = np.array(grid.shape), grid.is_slab
+    flat = grid.is_slab
     h, area = grid.spacing, grid.face_area
-    codes = boundaries.codes()
-    walls = (codes == CLOSED).astype(np.int64)
+    normal = boundaries.normal()
     distance = np.full((nx + 1, ny + 1, nz + 1), BAND * h)
     nearest = np.zeros((nx + 1, ny + 1, nz + 1), np.int64)
-    beside = beside_sides(shape, walls)
+    beside = beside_sides(grid, boundaries)
     ox, oy, oz = opened = [np.ones(grid.face_shape(d)) for d in range(3)]
     total = grid.zeros_faces()
     boxes = body_boxes(shapes, position, rotation, first_skin)
@@ -229,46 +221,35 @@ def geometry(
     around = [d for d in range(3) if boundaries.periodic()[d]]
     for d in around:
         join_ends(distance, d)
-    first, own = 0, []
+    first = 0
     for piece in pieces:
         alone = piece.crossings.at, piece.distance, piece.box
         merge_crossings(crossings.at, crossings.part, distance, *alone, first)
         first += piece.crossings.part.size
-        inside = piece.box[:, 1] - piece.box[:, 0] - 1
-        sizes = [inside + (np.arange(3) == d) for d in range(3)]
-        share = faces_of([np.zeros(size) for size in sizes])
-        middle = faces_of([np.zeros((2, *size)) for size in sizes])
-        own.append((piece, share, middle))
         for d in grid.axes:
-            faces = share[d], middle[d], total[d]
-            close_faces(*faces, piece.distance, piece.crossings, piece.box, d, flat)
-    parts = 0
-    for piece, share, middle in own:
+            close_faces(piece, total[d], d)
+    none = np.zeros(0, np.int64)
+    listed = [(none, none, none, np.zeros(0), np.zeros((0, 2)))]
+    for piece in pieces:
         for d in grid.axes:
-            parts += share_closed(
-                share[d], middle[d], opened[d], total[d], distance, crossings, beside, piece.box, d,
-                codes[d], flat,
-            )  # fmt: skip
+            faces = opened[d], total[d], distance, crossings, beside
+            face, closed, centre = share_closed(piece, *faces, d, normal[d])
+            axis, part_body = np.full(face.size, d), np.full(face.size, piece.body)
+            listed.append((axis, face, part_body, closed, centre))
     for d in around:
         join_ends(opened[d], d)
-    axis, face, part_body = (np.empty(parts, np.int64) for _ in range(3))
-    closed, centre, last = np.empty(parts), np.empty((parts, 2)), 0
-    for piece, share, middle in own:
-        for d in grid.axes:
-            counts = np.array(grid.face_shape(d))
-            into = axis, face, part_body, closed, centre
-            last = list_closed(share[d], middle[d], piece.box, d, piece.body, counts, last, *into)
-    kind = kinds_of_cells(ox, oy, oz, walls)
+    axis, face, part_body, closed, centre = map(np.concatenate, zip(*listed, strict=True))
+    kind = kinds_of_cells(ox, oy, oz, normal)
     with_rows = kind >= NARROW
-    bones = [each for each in own if each[0].body < first_skin]
+    bones = [piece for piece in pieces if piece.body < first_skin]
     middles = np.concatenate([boxes.mean(axis=1), skins.middle])
     images = Images(periods(grid, boundaries), middles)
     place, index = face_centres(axis, face, grid)
     first = int(np.searchsorted(part_body, first_skin))
     place[np.arange(first)[:, None], OTHER_AXES[axis[:first]]] += h * centre[:first]
     place = images.at_bodies(place, part_body)
-    rows = bone_rows(bones, with_rows, grid)
-    common = bone_rows([] if boundaries.has_free_side(grid) else bones, kind == COVERED, grid)
+    rows = bone_rows(bones, with_rows)
+    common = bone_rows([] if boundaries.has_free_side(grid) else bones, kind == COVERED)
     if flat:
         oz[:] = 0.0
     volume = np.ones(grid.shape)
@@ -277,7 +258,7 @@ def geometry(
     volume *= grid.cell_volume
     owner, force = rows[2][::6] // 6, rows[3].reshape(-1, 6)[:, :3]
     corner, weight = np.zeros((0, 3), np.int64), np.zeros((0, 3))
-    if first < parts:
+    if first < len(face):
         corner, weight = skin_at(skins, place[first:], grid)
         skin = axis[first:], index[first:], closed[first:], corner, weight, 6 * first_skin, area
         part, of_skin = flesh_rows(*skin, with_rows)
@@ -296,31 +277,21 @@ def geometry(
         owner = np.append(owner, np.full(lent[0].size, -1))
         force = np.concatenate([force, np.zeros((lent[0].size, 3))])
         rows = joined(rows, lent)
-    listed = ClosedParts(axis, face, part_body, closed, place, corner, weight)
+    closed_parts = ClosedParts(axis, face, part_body, closed, place, corner, weight)
     cut = distance, nearest, crossings, (ox, oy, oz), volume
-    return Geometry(*cut, listed, rows, owner, force, skins, images)
+    return Geometry(*cut, closed_parts, rows, owner, force, skins, images)
 
 
-def bone_rows(bones: list[tuple[Piece, Faces, Faces]], listed: Mask, grid: Grid) -> Rows:
-    """Rows of J of bones in listed cells.
-
-    bones   and what each closes of the faces in its box, and where, see `list_cells`
-    listed  (nx, ny, nz)
-    """
-    none, counts, size = np.zeros(0, np.int64), [0], (grid.spacing, grid.face_area, grid.is_slab)
-    given = [
-        (share, centre, listed, piece.box, piece.body, np.array(piece.grid.origin), *size)
-        for piece, share, centre in bones
-    ]
-    for bone in given:
-        counts.append(list_cells(*bone, counts[-1], none, none, np.zeros(0)))
-    rows = counts[-1]
-    cells, columns = np.empty(rows, np.int64), np.empty(6 * rows, np.int64)
-    values = np.empty(6 * rows)
-    for bone, at in zip(given, counts[:-1], strict=True):
-        if rows:
-            list_cells(*bone, at, cells, columns, values)
-    return cells, 6 * np.arange(rows + 1, dtype=np.int64), columns, values
+def bone_rows(bones: list[Piece], listed: Mask) -> Rows:
+    """Rows of J of bones in listed cells (nx, ny, nz)."""
+    cells, columns, values = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)], [np.zeros(0)]
+    for bone in bones:
+        own, wrench = list_cells(bone, listed)
+        cells.append(own)
+        columns.append(np.tile(6 * bone.body + np.arange(6), own.size))
+        values.append(wrench.ravel())
+    found = np.concatenate(cells)
+    return found, 6 * np.arange(found.size + 1), np.concatenate(columns), np.concatenate(values)
 
 
 def joined(rows: Rows, more: Rows) -> Rows:

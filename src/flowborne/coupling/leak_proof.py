@@ -32,7 +32,7 @@ from flowborne.fluid.control_volumes import NONE
 from flowborne.fluid.ghosts import impose_sides
 from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.fluid.projection import PressureGradient
-from flowborne.kernels.arrays import Integers
+from flowborne.kernels.arrays import PERIODIC, PRESCRIBED, Integers
 from flowborne.kernels.control_volumes import neighbour
 from flowborne.kernels.dye import face_of
 from flowborne.kernels.faces import mean_flux
@@ -110,9 +110,9 @@ def drive_sides(flux: Faces, weights: Faces, grid: Grid, sides: Boundaries, time
     impose_sides(flux, grid, sides, time)
     for place, side in sides.around(grid):
         through, weight = (field[place.axis][place.layer] for field in (flux, weights))
-        if side.prescribes:
+        if side.normal == PRESCRIBED:
             through *= weight * (grid.face_area / stiffness(grid))
-        if not side.joined:
+        if side.normal != PERIODIC:
             weight *= 2.0 * side.pressure_weight(place)
 
 

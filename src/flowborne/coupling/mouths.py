@@ -26,8 +26,9 @@ from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.dye import Brought
 from flowborne.fluid.grid import Array, Grid
 from flowborne.fluid.sides.far import Strength
-from flowborne.fluid.transport import NO_INLETS, Inlets
+from flowborne.fluid.transport import NO_INLETS
 from flowborne.kernels.arrays import Integers, Mask
+from flowborne.kernels.carry import Inlets
 from flowborne.solids.dynamics import Kinematics
 
 DEPTH = 3.0
@@ -235,8 +236,8 @@ def taken_by(
     if jet.rate >= 0.0:
         return 0.0
     index, (rates,) = at_faces(jet.cells, (-jet.rates,), axis, grid, sides)
-    share, at = np.zeros(inlets.index.size), np.searchsorted(inlets.index, index)
-    known = (at < inlets.index.size) & (inlets.index[at.clip(0, inlets.index.size - 1)] == index)
+    share, at = np.zeros(inlets.faces.size), np.searchsorted(inlets.faces, index)
+    known = (at < inlets.faces.size) & (inlets.faces[at.clip(0, inlets.faces.size - 1)] == index)
     share[at[known]] = rates[known]
     share = np.divide(share, inlets.loss, out=np.zeros(share.size), where=inlets.loss != 0.0)
     return float(share @ drained)

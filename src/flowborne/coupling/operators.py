@@ -15,7 +15,7 @@ from flowborne.coupling.fractions import Geometry
 from flowborne.fluid.dipoles import Dipoles
 from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.fluid.projection import PressureGradient
-from flowborne.kernels.arrays import DenseTerm
+from flowborne.kernels.arrays import FREE, DenseTerm
 from flowborne.kernels.coupling_rows import add_body_velocity
 from flowborne.kernels.sparse_rows import add_rows, sum_rows
 from flowborne.solids.dynamics import Kinematics
@@ -97,7 +97,7 @@ def side_push(pressure: Array, opened: Faces, gradient: PressureGradient) -> Arr
         force[place.axis] -= (1 - 2 * place.upper) * grid.face_area * float(answer.sum())
     for place, side in boundaries.around(grid):
         met = pressure[place.layer] * (1.0 - side.pressure_weight(place))
-        if side.free:
+        if side.normal == FREE:
             met *= opened[place.axis][place.layer]
         force[place.axis] += (1 - 2 * place.upper) * grid.face_area * float(met.sum())
     return force

@@ -16,7 +16,7 @@ from flowborne.fluid.grid import Grid
 from flowborne.fluid.sides.far import Sea, sea_of
 from flowborne.fluid.sides.kinds import BoundaryClosed
 from flowborne.fluid.sides.side import Boundary, Place
-from flowborne.kernels.arrays import CLOSED, OPEN, PERIODIC, Integers, Marks
+from flowborne.kernels.arrays import FREE, PERIODIC, Integers
 
 WALL = BoundaryClosed()
 
@@ -66,7 +66,7 @@ class Boundaries:
     def __post_init__(self) -> None:
         for axis, name in enumerate("xyz"):
             low, high = self.pair(axis)
-            if low.joined != high.joined:
+            if (low.normal == PERIODIC) != (high.normal == PERIODIC):
                 raise ValueError(
                     f"boundaries {name}_min is {low.kind} and {name}_max is {high.kind}: "
                     "make both of them periodic or neither"
@@ -78,7 +78,7 @@ class Boundaries:
 
     def periodic(self) -> tuple[bool, bool, bool]:
         """Of each axis."""
-        x, y, z = (low.joined for low, _ in self._pairs)
+        x, y, z = (low.normal == PERIODIC for low, _ in self._pairs)
         return x, y, z
 
     @cached_property
@@ -92,15 +92,10 @@ class Boundaries:
         for place in places(grid):
             yield place, self._pairs[place.axis][place.upper]
 
-    def prescribed(self, axis: int) -> Marks:
-        """(2,) 1 where the lower or upper side across an axis prescribes what crosses it."""
-        return np.array([side.prescribes for side in self.pair(axis)], np.uint8)
-
-    def codes(self) -> Integers:
-        """(3, 2) what the lower and upper side of each axis are to the pressure: CLOSED, OPEN or
-        PERIODIC."""
-        code = {(False, False): CLOSED, (True, False): OPEN, (False, True): PERIODIC}
-        return np.array([[code[side.free, side.joined] for side in pair] for pair in self._pairs])
+    def normal(self) -> Integers:
+        """(3, 2) a of the velocity across the lower and upper side of each axis: PRESCRIBED, FREE
+        or PERIODIC."""
+        return np.array([[side.normal for side in pair] for pair in self._pairs], np.int64)
 
     def sea(self, grid: Grid) -> Sea | None:
         """The sea around a grid; raises ValueError as `sea_of` does."""
@@ -126,11 +121,11 @@ class Boundaries:
 
     def has_free_side(self, grid: Grid) -> bool:
         """Whether the pressure decides what crosses one of the sides."""
-        return any(side.free for _, side in self.around(grid))
+        return any(side.normal == FREE for _, side in self.around(grid))
 
     def gain_energy(self, grid: Grid) -> bool:
         """Whether fluid that comes in through one of the sides may bring energy."""
-        return any(side.free and not side.endless for _, side in self.around(grid))
+        return any(side.normal == FREE and not side.endless for _, side in self.around(grid))
 
     def check(self, grid: Grid) -> None:
         """Raise ValueError when a slab's z sides are not closed."""

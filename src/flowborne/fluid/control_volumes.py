@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flowborne.fluid.boundary import Boundaries
-from flowborne.fluid.ghosts import edge, kernel_axes, plane, planes
+from flowborne.fluid.ghosts import edge, face_grid, plane, planes
 from flowborne.fluid.grid import Array, Faces, Grid, faces_of, inner_product
 from flowborne.kernels.arrays import Integers
 from flowborne.kernels.control_volumes import (
@@ -68,7 +68,7 @@ class ControlVolumes:
     def follow(self, velocity: Faces, grid: Grid) -> None:
         """Give closed faces the velocity of their targets, in place."""
         for axis in grid.axes:
-            share_velocity(velocity[axis], *self.closed[axis])
+            share_velocity(velocity[axis], self.closed[axis])
 
 
 def control_volumes(
@@ -87,21 +87,22 @@ def moving_volumes(
     component: int, cells: Array, opened: Faces, grid: Grid, boundaries: Boundaries
 ) -> tuple[Array, Integers, Closed, Transfers]:
     """What moves with the faces across an axis, and what `ControlVolumes` has of them."""
-    axis, shape, wraps = kernel_axes(component, grid, boundaries)
-    told, ring, cell = boundaries.prescribed(component), wraps[axis] > 0, grid.cell_volume
+    faces = face_grid(component, grid, boundaries)
+    axis, shape, wraps = faces
+    ends, cell = boundaries.normal()[component], grid.cell_volume
     room, wide = plane(cells, grid), planes(opened, grid)
     found, kinds = np.empty(grid.face_shape(component)), np.empty(shape, np.uint8)
     volume = plane(found, grid)
     counts = np.empty((shape[0] * shape[1], 3), np.int64)
     limits = cell, WHOLE, SLACK * cell, NOTHING * cell
-    sort_faces(volume, kinds, counts, room, wide[axis], axis, told, ring, limits)
+    sort_faces(volume, kinds, counts, room, wide[axis], axis, ends, limits)
     cut, shut, uneven = listed_kinds(kinds, counts)
-    targets = find_targets(shut, kinds, wide[axis], volume, room, axis, wraps)
+    targets = find_targets(shut, kinds, wide[axis], volume, room, faces)
     closed = Closed(shut, *targets)
     for _ in range(ROUNDS):
-        uneven = np.sort(with_neighbours(uneven, kinds, shape, wraps))
-    given = share_out(volume, closed, kinds, uneven, room, wide, axis, wraps, cell)
-    if ring:
+        uneven = np.sort(with_neighbours(uneven, kinds, faces))
+    given = share_out(volume, closed, kinds, uneven, room, wide, faces, cell)
+    if wraps[axis] > 0:
         found[edge(component, -1)] = found[edge(component, 0)]
     return found, cut, closed, given
 

@@ -21,7 +21,7 @@ import numpy as np
 
 from flowborne.fluid.sides.far import BoundaryFar, Centre
 from flowborne.fluid.sides.side import Boundary, Place
-from flowborne.kernels.arrays import Array, Integers, Mask
+from flowborne.kernels.arrays import FREE, Array, Integers, Mask
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ def directions(sides: Sequence[tuple[Place, Boundary]], centre: Centre) -> list[
     if not all(any(side.endless for side in pair) for pair in outside.values()):
         return []
     mirrors = {a: s for a, pair in outside.items() for s in pair if not s.endless}
-    opened = [axis for axis, side in mirrors.items() if side.free]
+    opened = [axis for axis, side in mirrors.items() if side.normal == FREE]
     if opened:
         return opened if len(opened) == 1 else []
     return [axis for axis in outside if axis not in mirrors]

@@ -24,7 +24,7 @@ from flowborne.fluid.sides.side import Place
 from flowborne.fluid.transport import SUBSTEPS, Transport, parts_for
 from flowborne.kernels.arrays import Integers, Marks
 from flowborne.kernels.control_volumes import mark_cut
-from flowborne.kernels.dye import CUT, WHOLE, list_flows, pass_on, sort_cells, sweep
+from flowborne.kernels.dye import CUT, WHOLE, CutCells, list_flows, pass_on, sort_cells, sweep
 
 REACH = 2
 """Cells on both sides that the parabola in a cell is made from."""
@@ -92,10 +92,9 @@ class Passage:
         self.transport, self.brought, self.backwards = transport, brought, backwards
         self.grid, self.sides = grid, sides
         start, end = transport.before.cells, transport.after.cells
-        kind, fullest = np.empty(grid.shape, np.uint8), np.empty(grid.shape[0])
         filled, uncut = np.abs(brought.rate), UNCUT * grid.cell_volume
         filled.reshape(-1)[brought.cells] += brought.gain
-        sort_cells(kind, fullest, start, end, filled, *transport.flux, uncut)
+        kind, fullest = sort_cells(start, end, filled, transport.flux, uncut)
         flowing = transport.dt * float(fullest.max())
         self.count = parts_for(min(flowing, SUBSTEPS))
         self.dt = transport.dt / self.count
@@ -103,17 +102,16 @@ class Passage:
         shape, wraps = np.array(grid.shape), np.array(grid.shape) * np.array(sides.periodic())
         self.clear: Marks = np.ones(grid.shape, np.uint8)
         mark_cut(self.clear, others, shape, wraps, REACH)
-        self.flux, self.listed = transport.flux, others[kind.reshape(-1)[others] == CUT]
+        self.flux, listed = transport.flux, others[kind.reshape(-1)[others] == CUT]
         self.given: dict[tuple[str, int, int], Array | None] = {}
-        n = self.listed.size
-        self.beside, self.row = np.full((n, 6), -1), np.full((n, 6), -1)
-        self.out = np.zeros((n, 6))
+        n = listed.size
+        tables = np.full((n, 6), -1), np.full((n, 6), -1), np.zeros((n, 6))
+        self.cut = CutCells(listed, *tables)
         if n:
             self.flux = faces_of([q.copy() for q in transport.flux])
-            tables = self.beside, self.row, self.out
             for axis in grid.axes:
-                list_flows(self.listed, axis, self.flux[axis], wraps, shape, *tables)
-        self.expelled = np.searchsorted(self.listed, brought.cells)
+                list_flows(self.cut, axis, self.flux[axis], wraps, shape)
+        self.expelled = np.searchsorted(listed, brought.cells)
 
     def carry(self, name: str, values: Array, bounds: tuple[float, float]) -> tuple[Array, float]:
         """A scalar a step later, and the amount that came in through sides, mouths and sources.
@@ -124,20 +122,21 @@ class Passage:
         field, gained = values.copy(), 0.0
         for s in range(self.count):
             volume = start + (s / self.count) * (end - start) if s > 0 else start.copy()
-            if self.listed.size:
+            if self.cut.listed.size:
                 gained += self.pass_on(name, field, volume, bounds)
             order = self.grid.axes if (s % 2 == 0) != self.backwards else self.grid.axes[::-1]
             for axis in order:
                 ends = np.stack([self.beyond(name, field, axis, upper) for upper in (0, 1)])
-                crossed = np.zeros(ends.shape)
-                wraps = self.sides.periodic()[axis]
-                sweep(
+                crossed = sweep(
                     along(field, axis, self.grid),
                     along(volume, axis, self.grid),
                     along(self.flux[axis], axis, self.grid),
                     along(self.clear, axis, self.grid),
-                    ends, wraps, self.dt, *bounds, crossed,
-                )  # fmt: skip
+                    ends,
+                    self.sides.periodic()[axis],
+                    self.dt,
+                    bounds,
+                )
                 gained += float(crossed[0].sum() - crossed[1].sum())
         return field, gained
 
@@ -163,12 +162,12 @@ class Passage:
 
     def pass_on(self, name: str, field: Array, volume: Array, bounds: tuple[float, float]) -> float:
         """Carry a scalar through the faces of the cut cells, in place; gives what came in."""
-        n, dt = self.listed.size, self.dt
+        listed, n, dt = self.cut.listed, self.cut.listed.size, self.dt
         entering, gain, dye = np.zeros((n, 6)), np.zeros(n), np.zeros(n)
-        at = np.unravel_index(self.listed, self.grid.shape)
+        at = np.unravel_index(listed, self.grid.shape)
         for axis in self.grid.axes:
             for upper in (0, 1):
-                rows = np.flatnonzero(self.beside[:, 2 * axis + upper] < 0)
+                rows = np.flatnonzero(self.cut.beside[:, 2 * axis + upper] < 0)
                 if rows.size:
                     layer = self.beyond(name, field, axis, upper)
                     layer = layer.T if self.grid.is_slab else layer
@@ -177,9 +176,9 @@ class Passage:
         gain[self.expelled] = dt * self.brought.gain
         if self.brought.cells.size:
             dye[self.expelled] = dt * self.brought.dye[name]
-        local = dt * self.brought.rate.reshape(-1)[self.listed] - gain
-        tables = self.listed, self.beside, self.row, dt * self.out
-        return pass_on(field, volume, *tables, entering, gain, dye, local, *bounds)
+        local = dt * self.brought.rate.reshape(-1)[listed] - gain
+        cells = self.cut._replace(out=dt * self.cut.out)
+        return pass_on(field, volume, cells, entering, gain, dye, local, bounds)
 
 
 def along(values: NDArray[Scalar], axis: int, grid: Grid) -> NDArray[Scalar]:

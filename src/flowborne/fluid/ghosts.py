@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.grid import Faces, Grid
 from flowborne.fluid.sides.side import tangential_change
-from flowborne.kernels.arrays import Integers
-from flowborne.kernels.carry import HELD, JOINED, MIRRORED, PRESCRIBED, Sides
+from flowborne.kernels.arrays import PRESCRIBED, FaceGrid
+from flowborne.kernels.carry import Sides
 
 Scalar = TypeVar("Scalar", bound=np.generic)
 
@@ -38,14 +38,13 @@ def planes(faces: Faces, grid: Grid) -> Faces:
     return (plane(x, grid), plane(x, grid), plane(y, grid)) if grid.is_slab else (x, y, z)
 
 
-def kernel_axes(component: int, grid: Grid, sides: Boundaries) -> tuple[int, Integers, Integers]:
-    """Of the faces across an axis, in the order of the kernels' axes: that axis, the shape of their
-    fields, and (3,) how many distinct ones there are along each periodic axis, else 0."""
+def face_grid(component: int, grid: Grid, sides: Boundaries) -> FaceGrid:
+    """The faces across an axis."""
     wraps = np.array(grid.shape, np.int64) * np.array(sides.periodic(), np.int64)
     shape = np.array(grid.face_shape(component))
     if not grid.is_slab:
-        return component, shape, wraps
-    return component + 1, np.array([1, *shape[:2]]), np.array([0, *wraps[:2]])
+        return FaceGrid(component, shape, wraps)
+    return FaceGrid(component + 1, np.array([1, *shape[:2]]), np.array([0, *wraps[:2]]))
 
 
 def impose_sides(velocity: Faces, grid: Grid, boundaries: Boundaries, time: float) -> None:
@@ -61,36 +60,25 @@ def packed_sides(
     see `kernels.carry`.
 
     flux  volume per time through each face, m^3/s
-
-    Along the component's own axis ghosts hold what the side's faces do. Along the others the mean
-    of the first ghost and its neighbour is what the side prescribes, and the second mirrors the
-    next neighbour likewise.
     """
     table, walls, changes, first = [], [], [], 0
     shape = grid.face_shape(component)
     for place, side in boundaries.around(grid):
         own, layer = place.axis == component, list(shape)
         layer[place.axis] = 1
-        size, beyond = prod(layer), JOINED if side.joined else HELD
-        prescribed, used = np.zeros((len(times), size)), range(len(times))
-        if own:  # what enters has its own velocity again after each substep but the last one
-            used = range(1, len(times) - 1) if side.supplies else range(0)
-        for n in used if not side.joined else ():
-            wall = side.prescribed_velocity(place, component, times[n])
-            if wall is None:
-                beyond = HELD if side.free else MIRRORED
-                break
-            if not own:
-                beyond = PRESCRIBED
-            prescribed[n] = np.broadcast_to(np.asarray(wall), layer).reshape(-1)
+        size = prod(layer)
+        prescribed = np.zeros((len(times), size))
+        if (side.normal if own else side.tangential) == PRESCRIBED:
+            for wall, time in zip(prescribed, times, strict=True):
+                wall.reshape(layer)[:] = side.prescribed_velocity(place, component, time)
         change, still = np.zeros(layer), side.irrotational_inflow(place)
         if own:
             still &= boundaries.sea(grid) is not None
         elif still:
             normal = flux[place.axis][place.layer] / grid.face_area
             change = tangential_change(normal, place, component, boundaries.periodic()[component])
-        axis = place.axis + grid.is_slab
-        table.append((axis, place.upper, beyond, side.free, side.supplies, first, still))
+        axis, rules = place.axis + grid.is_slab, (side.normal, side.tangential)
+        table.append((axis, place.upper, *rules, side.supplies, first, still))
         walls.append(prescribed)
         changes.append(change.reshape(-1))
         first += size

@@ -8,6 +8,7 @@ import numpy as np
 
 from flowborne.kernels.arrays import Array as Array
 from flowborne.kernels.arrays import Faces as Faces
+from flowborne.kernels.arrays import Nodes
 
 
 def faces_of(values: list[Array]) -> Faces:
@@ -79,6 +80,11 @@ class Grid:
         """(x, y, z) of the upper corner in m."""
         o, n, h = self.origin, self.shape, self.spacing
         return (o[0] + n[0] * h, o[1] + n[1] * h, o[2] + n[2] * h)
+
+    @property
+    def nodes(self) -> Nodes:
+        """Where the nodes are, as kernels take it."""
+        return Nodes(np.array(self.origin), self.spacing, self.is_slab)
 
     def face_shape(self, axis: int) -> tuple[int, int, int]:
         """Shape of the array of faces across `axis`."""

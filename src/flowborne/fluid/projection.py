@@ -63,9 +63,10 @@ class PressureGradient:
     def subtract(self, velocity: Faces, pressure: Array, scale: float) -> None:
         """Subtract scale rate (p_upper - p_lower) on every face, in place; see
         `subtract_gradient`."""
-        codes = self.boundaries.codes()
+        periodic = self.boundaries.periodic()
         for axis in self.grid.axes:
-            subtract_gradient(velocity[axis], self.rate[axis], pressure, axis, scale, codes)
+            rate = self.rate[axis]
+            subtract_gradient(velocity[axis], rate, pressure, axis, scale, periodic[axis])
         for place, answer in self.dipoles.answer(pressure) if self.dipoles else ():
             change = scale * self.whole * answer
             velocity[place.axis][place.layer] += change if place.upper else -change

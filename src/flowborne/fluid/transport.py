@@ -31,13 +31,13 @@ import numpy as np
 
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.control_volumes import NONE, NOTHING, ControlVolumes
-from flowborne.fluid.ghosts import edge, kernel_axes, packed_sides, plane, planes
+from flowborne.fluid.ghosts import edge, face_grid, packed_sides, plane, planes
 from flowborne.fluid.grid import Array, Faces, Grid
 from flowborne.kernels.arrays import Integers, Marks
-from flowborne.kernels.carry import Fluxes, Inflows, Scratch, Volumes, carry, prepare
+from flowborne.kernels.carry import Exchange, Inlets, Scratch, Volumes, carry, prepare
 from flowborne.kernels.control_volumes import Transfers
 from flowborne.kernels.eddies import edges_near, exchange, exchanges
-from flowborne.kernels.flux import GHOSTS, largest_crossing
+from flowborne.kernels.flux import GHOSTS, Fluxes, Padded, largest_crossing
 
 COURANT = 0.8
 """Cells that the flow may cross in a substep, the axes added up: Heun's method with values of third
@@ -61,22 +61,6 @@ UPWIND_DAMPING = 4.0 / 3.0
 def parts_for(amount: float) -> int:
     """Fewest equal parts of which none is greater than 1; one of what is not a finite number."""
     return max(1, int(np.ceil(amount - SLACK))) if np.isfinite(amount) else 1
-
-
-@dataclass(frozen=True)
-class Inlets:
-    """What comes into the control volumes of one component from within, and goes there.
-
-    index     (n,) flat, each once
-    gain      (n,) m^3/s that come in with
-    velocity  (n,) m/s
-    loss      (n,) m^3/s that leave with the velocity of the fluid there; negative come in with it
-    """
-
-    index: Integers
-    gain: Array
-    velocity: Array
-    loss: Array
 
 
 NO_INLETS = Inlets(np.zeros(0, np.int64), np.zeros(0), np.zeros(0), np.zeros(0))
@@ -167,22 +151,21 @@ def carry_component(
     along     what else it is given in the step, m/s^2; beside bodies it is set to 0; None for
               nothing
     """
-    count, (axis, shape, wraps) = transport.substeps(grid), kernel_axes(component, grid, sides)
+    count, faces = transport.substeps(grid), face_grid(component, grid, sides)
     before, after, dt = transport.before, transport.after, transport.dt / count
     times = [transport.time + n * dt for n in range(count + 1)]
     table = packed_sides(component, grid, sides, times, transport.flux)
     ring = sides.periodic()[component]
-    flux = Fluxes(planes(transport.flux, grid), *neighbours(int(shape[axis]), ring))
+    means = neighbours(int(faces.shape[faces.component]), ring)
+    flux = Fluxes(planes(transport.flux, grid), faces.component, *means)
     given = passed_on(before.transfers[component], after.transfers[component], transport.dt)
-    inflows = Inflows(inlets.index, inlets.gain * inlets.velocity, inlets.loss)
+    exchange = Exchange(flux, table, inlets, given)
     cut = np.union1d(before.cut[component], after.cut[component])
     out = np.empty(velocity.shape)
     fields = plane(out, grid), plane(velocity, grid), plane(velocity, grid)
-    with borrowed(grid, shape.tolist()) as scratch:
-        leaving = prepare(
-            scratch.marks, plane(before.cells, grid), cut, given, flux, table, inflows, axis,
-            shape, wraps,
-        )  # fmt: skip
+    with borrowed(grid, faces.shape.tolist()) as scratch:
+        marks, cells = scratch.padded.marks, plane(before.cells, grid)
+        leaving = prepare(marks, cells, cut, exchange, faces)
         volumes = Volumes(
             plane(before.moving[component], grid),
             plane(after.moving[component], grid),
@@ -190,10 +173,7 @@ def carry_component(
             leaving,
             before.closed[component],
             after.closed[component],
-            given,
-            axis,
-            shape,
-            wraps,
+            faces,
             NOTHING * grid.cell_volume,
         )
         if along is not None:
@@ -202,9 +182,7 @@ def carry_component(
                 along[edge(component, -1)] = along[edge(component, 0)]
             fields = *fields[:2], plane(along, grid)
         rising = 0.0 if along is None else transport.extrapolated(grid)
-        crossed, held_back, drained = carry(
-            *fields, rising, volumes, flux, table, inflows, scratch, dt, count
-        )
+        crossed, held_back, drained = carry(*fields, rising, volumes, exchange, scratch, dt)
     return Carried(out, crossed, held_back, drained)
 
 
@@ -222,8 +200,8 @@ def borrowed(grid: Grid, shape: list[int]) -> Iterator[Scratch]:
         most = prod(n + 1 + deep if axis in grid.axes else n for axis, n in enumerate(grid.shape))
         memory, bits = np.zeros((7, most)), np.zeros(most, np.uint8)
     wide = [n + deep * (axis > 0 or not grid.is_slab) for axis, n in enumerate(shape)]
-    padded, marks = memory[0, : prod(wide)].reshape(wide), bits[: prod(wide)].reshape(wide)
-    yield Scratch(padded, marks, *(flat[: prod(shape)].reshape(shape) for flat in memory[1:]))
+    padded = Padded(memory[0, : prod(wide)].reshape(wide), bits[: prod(wide)].reshape(wide))
+    yield Scratch(padded, *(flat[: prod(shape)].reshape(shape) for flat in memory[1:]))
     store.append((memory, bits))
 
 

@@ -32,13 +32,14 @@ import numpy as np
 
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.grid import Array, Faces, Grid
-from flowborne.kernels.arrays import Integers, Marks
+from flowborne.kernels.arrays import PRESCRIBED, Integers, Marks
 from flowborne.kernels.control_volumes import CLOSED_BELOW
 from flowborne.kernels.corner_friction import corner_stiffness, find_corners
 from flowborne.kernels.edge_crossings import Crossings
 from flowborne.kernels.viscosity import (
     INACTIVE,
     UNKNOWN,
+    CutFaces,
     classify,
     face_distances,
     find_centres,
@@ -131,7 +132,7 @@ def assemble_viscosity(
     masses    Faces, of the fluid that belongs to each face, kg
     time      s, of the sides' prescribed velocities
     """
-    codes = boundaries.codes()
+    normal = boundaries.normal()
     periodic = boundaries.periodic()
     h = grid.spacing
     stiffness = viscosity * grid.face_area / h
@@ -143,7 +144,7 @@ def assemble_viscosity(
         kind, away = np.empty(shape, np.uint8), np.empty(shape)
         face_distances(cut.distance, axis, away)
         away -= NEAR * h
-        classify(kind, opened, axis, codes, CLOSED_BELOW)
+        classify(kind, opened, axis, normal, CLOSED_BELOW)
         near = np.flatnonzero((kind != INACTIVE) & (away <= 0.0))
         centre = np.zeros((2, *shape))
         find_centres(*edges, axis, near, centre, grid.is_slab)
@@ -152,19 +153,15 @@ def assemble_viscosity(
         mass[(friction > 0.0) & (kind == UNKNOWN)] *= SIDE_MASS
         diagonal = np.where(kind == UNKNOWN, mass + friction, 0.0)
         links = np.zeros((3, *shape))
-        around = away, *edges, opened, centre, parts, velocity[axis], stiffness, diagonal
+        faces = CutFaces(axis, kind, *edges, opened, centre, parts, stiffness)
         for d in grid.axes:
-            link_faces(axis, d, kind, *around, links[d], given, periodic[d])
+            around = away, velocity[axis], diagonal, links[d], given
+            link_faces(faces, d, *around, periodic[d])
         beside = near[kind.reshape(-1)[near] == UNKNOWN]
-        wall, node = np.zeros((beside.size, 3)), np.zeros((beside.size, 3), np.int64)
-        gap, place = np.zeros((beside.size, 3, 3)), np.zeros((beside.size, 3, 3))
-        meet_walls(
-            axis, kind, *edges, opened, centre, parts, stiffness, codes, beside,
-            wall, gap, place, node,
-        )  # fmt: skip
+        wall, gap, place, node = meet_walls(faces, normal, beside)
         diagonal.reshape(-1)[beside] += wall.sum(axis=1)
-        walls = opened, parts, links, beside, wall[:, 0], stiffness, wraps, cut.distance
-        corners = Corners(*corner_stiffness(axis, *found, kind, *walls))
+        walls = links, beside, wall[:, 0], wraps
+        corners = Corners(*corner_stiffness(faces, *found, *walls))
         np.add.at(diagonal.reshape(-1), corners.faces, np.einsum("nii->ni", corners.matrix))
         met = wall != 0.0
         beside = np.repeat(beside, met.sum(axis=1))
@@ -181,8 +178,8 @@ def stick_to_sides(
     ones, N."""
     friction, given = np.zeros(kind.shape), np.zeros(kind.shape)
     for place, side in boundaries.around(grid):
-        wall = None if place.axis == axis else side.prescribed_velocity(place, axis, time)
-        if wall is not None:
+        if place.axis != axis and side.tangential == PRESCRIBED:
+            wall = side.prescribed_velocity(place, axis, time)
             coefficient = 2.0 * stiffness * (kind[place.layer] == UNKNOWN)
             friction[place.layer] += coefficient
             given[place.layer] += coefficient * wall

@@ -12,6 +12,7 @@ from flowborne.fluid.grid import Array, Faces, Grid, faces_of
 from flowborne.fluid.sides.side import Boundary, Place, tangential_change
 from flowborne.fluid.state import FluidState
 from flowborne.fluid.wake import after_move
+from flowborne.kernels.arrays import FREE, PRESCRIBED
 
 
 @dataclass(frozen=True)
@@ -30,7 +31,7 @@ class Window:
 
 def crosses(side: Boundary | type[Boundary]) -> bool:
     """Whether a grid may move across a side: whether there is fluid beyond."""
-    return side.free or side.supplies
+    return side.normal == FREE or side.supplies
 
 
 def moved_fluid(
@@ -87,8 +88,8 @@ def _with_layer(
     )
     found = list(state.velocity)
     for component, layer in enumerate(layers):
-        told = side.prescribed_velocity(new, component, time)
-        if told is not None and component != axis:
+        if side.tangential == PRESCRIBED and component != axis:
+            told = side.prescribed_velocity(new, component, time)
             layer = np.broadcast_to(told, layer.shape)
         found[component] = shifted(state.velocity[component], axis, upper, layer)
     side.impose(found[axis], new, time)
@@ -105,7 +106,7 @@ def _irrotational(velocity: Faces, sides: Boundaries, beyond: Place) -> list[Arr
         if component != axis:
             change = tangential_change(through, beyond, component, sides.periodic()[component])
             for end, beside in zip((slice(1), slice(-1, None)), sides.pair(component), strict=True):
-                if beside.prescribes:
+                if beside.normal == PRESCRIBED:
                     change[edge(component, end)] = 0.0
             layer = layer + change
             spread += np.diff(layer, axis=component)

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
 ROUNDING = 1e-15
 """Relative size of what is a rounding error of numbers in double precision."""
 
-CLOSED, OPEN, PERIODIC = range(3)
-"""What a side is to the pressure: a wall or an inflow, p = 0, or the opposite side."""
+PRESCRIBED, PERIODIC, FREE = -1, 0, 1
+"""a in u_ghost = a u_inside + b beyond a side: it gives the component of velocity on it, is the
+opposite side, or leaves the component to the flow; see `fluid.sides.side`."""
 
 Array = NDArray[np.float64]
 Faces = tuple[Array, Array, Array]
@@ -67,6 +70,33 @@ rows below begin (s+1,), those rows, where its values begin (s+1,), and the bloc
 MobilityArrays = tuple[Array, Indices, Indices, Array, Array, Blocks, Integers, Array]
 """Dense A^-1; rows of T (start, column, value); values of L and its blocks; the order P; Y (see
 `solvers.mobility`)."""
+
+
+class Nodes(NamedTuple):
+    """Where the nodes of the grid are: (i, j, k) at origin + spacing (i, j, k).
+
+    origin   (3,) m
+    spacing  m
+    flat     whether it is a slab, whose nodes lie at z = 0
+    """
+
+    origin: Array
+    spacing: float
+    flat: bool
+
+
+class FaceGrid(NamedTuple):
+    """The faces across one axis, and their control volumes, in the order of the kernels' axes.
+
+    component  that axis
+    shape      (3,) of fields on them
+    wraps      (3,) how many distinct ones there are along each periodic axis, else 0
+    """
+
+    component: int
+    shape: Integers
+    wraps: Integers
+
 
 Point = tuple[float, float, float]
 """In kernels; a row of an array serves as well."""

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit, prange
 
-from flowborne.kernels.arrays import Array, Faces, Integers, Marks
+from flowborne.kernels.arrays import FREE, PERIODIC, PRESCRIBED, Array, FaceGrid, Integers, Marks
 from flowborne.kernels.control_volumes import (
     Closed,
     Transfers,
@@ -23,15 +23,22 @@ from flowborne.kernels.control_volumes import (
     share_velocity,
 )
 from flowborne.kernels.face_masses import add_transfers, give, place_of
-from flowborne.kernels.flux import CLEAR, CUT, GHOSTS, UPSTREAM, pad_field, stage
+from flowborne.kernels.flux import (
+    CLEAR,
+    CUT,
+    GHOSTS,
+    UPSTREAM,
+    Fluxes,
+    Padded,
+    Stage,
+    in_line,
+    pad_field,
+    stage,
+)
 from flowborne.kernels.jit import kernel
 
-MIRRORED, HELD, PRESCRIBED, JOINED = range(4)
-"""Ghosts beyond a side: those inside mirrored, the layer at the side held, such that the mean of
-both is what the side prescribes, or what is inside the opposite side."""
-
-AXIS, UPPER, BEYOND, FREE, SUPPLIES, FIRST, IRROTATIONAL = range(7)
-"""Columns of the table of sides: where the side lies, what is beyond it, whether it is free and
+AXIS, UPPER, NORMAL, TANGENTIAL, SUPPLIES, FIRST, IRROTATIONAL = range(7)
+"""Columns of the table of sides: where the side lies, a of the velocity across and along it and
 whether it supplies fluid (see `fluid.sides.side`), where its layer begins in packed layers, and
 whether what comes in through a free side has `Sides.change` more beyond it than inside."""
 
@@ -40,7 +47,7 @@ class Sides(NamedTuple):
     """The sides of the domain to one component.
 
     table   (n, 7) integers, one row for each side
-    wall    (times, k) packed layers of what they prescribe when each stage begins and ends
+    wall    (substeps + 1, k) packed layers of what they prescribe when each begins and ends
     change  (k,) see IRROTATIONAL
     rate    (k,) volume per time that comes in
     share   (k,) of each control volume in the volume of its layer
@@ -60,9 +67,7 @@ class Volumes(NamedTuple):
     cut              (n,) those that are cut at one of them
     leaving          (n,) volume per time that leaves each
     was_shut, shut   closed ones at both ends
-    given            what transfers give, volume per time
-    component        axis of the kernel
-    shape, wraps     (3,) see `control_volumes.neighbour`
+    faces            whose they are
     nothing          volume up to which one holds nothing
     """
 
@@ -72,37 +77,39 @@ class Volumes(NamedTuple):
     leaving: Array
     was_shut: Closed
     shut: Closed
-    given: Transfers
-    component: int
-    shape: Integers
-    wraps: Integers
+    faces: FaceGrid
     nothing: float
 
 
-class Fluxes(NamedTuple):
-    """Volume per time through the faces of the cells across each axis, and which of them those
-    through the sides of control volumes are means of, see `flux.stage`."""
+class Inlets(NamedTuple):
+    """What comes into the control volumes of one component from within, and goes there.
 
-    through: Faces
-    place: Integers
-    share: Array
-
-
-class Inflows(NamedTuple):
-    """What inlets bring: volume x velocity per time, and volume per time that leaves with the
-    fluid's own; in flat control volumes, each once."""
+    faces     (n,) flat, each once
+    gain      (n,) m^3/s that come in with
+    velocity  (n,) m/s
+    loss      (n,) m^3/s that leave with the velocity of the fluid there; negative come in with it
+    """
 
     faces: Integers
-    brought: Array
+    gain: Array
+    velocity: Array
     loss: Array
+
+
+class Exchange(NamedTuple):
+    """What control volumes exchange: through their sides, with the outside and with each other."""
+
+    flux: Fluxes
+    sides: Sides
+    inlets: Inlets
+    given: Transfers
 
 
 class Scratch(NamedTuple):
     """Arrays that a step is done in, without meaning before and after it: like the padded velocity
     and like the velocity; `nought` is 0 before and after."""
 
-    padded: Array
-    marks: Marks
+    padded: Padded
     net: Array
     start: Array
     middle: Array
@@ -128,52 +135,51 @@ def layer(row: Integers, field: Array, shape: Integers) -> tuple[int, int, int, 
 
 
 @njit(nogil=True, cache=True)
-def fill_ghosts(field: Array, sides: Sides, time: int, shape: Integers, component: int) -> None:
-    """Set the two layers of ghosts around a padded field such that they carry the conditions at the
-    sides, in place; corners are left alone.
+def fill_ghosts(field: Array, sides: Sides, time: int, faces: FaceGrid) -> None:
+    """Set the two layers of ghosts around a padded field, u_ghost = a u_inside + b, in place;
+    corners are left alone.
+
+    Along a side whose flux is prescribed the second ghost is of the second layer inside. Elsewhere
+    both are of the first one: beyond free sides and, with a = 1, across the component's own ones.
 
     time  row of what the sides prescribe
     """
     flat = field.reshape(-1)
     for s in range(sides.table.shape[0]):
         row = sides.table[s]
-        beyond, first = row[BEYOND], row[FIRST]
-        start, out, one, other, n, m, length = layer(row, field, shape)
-        period = (length - int(row[AXIS] == component)) * out
-        for a in range(n):
-            for b in range(m):
-                at = start + a * one + b * other
-                if beyond == HELD:
-                    flat[at + out] = flat[at + 2 * out] = flat[at]
-                elif beyond == MIRRORED:
-                    flat[at + out], flat[at + 2 * out] = flat[at], flat[at - out]
-                elif beyond == PRESCRIBED:
-                    twice = 2.0 * sides.wall[time, first + a * m + b]
-                    flat[at + out] = twice - flat[at]
-                    flat[at + 2 * out] = twice - flat[at - out]
-                else:
+        own, first = row[AXIS] == faces.component, row[FIRST]
+        start, out, one, other, n, m, length = layer(row, field, faces.shape)
+        period = (length - int(own)) * out
+        factor = 1.0 if own else float(row[TANGENTIAL])
+        inward = out if row[NORMAL] == PRESCRIBED and not own else 0
+        for i in range(n):
+            for j in range(m):
+                at = start + i * one + j * other
+                if row[NORMAL] == PERIODIC:
                     flat[at + out] = flat[at + out - period]
                     flat[at + 2 * out] = flat[at + 2 * out - period]
+                else:
+                    b = 2.0 * sides.wall[time, first + i * m + j] if factor < 0.0 else 0.0
+                    flat[at + out] = factor * flat[at] + b
+                    flat[at + 2 * out] = factor * flat[at - inward] + b
 
 
 @njit(nogil=True, cache=True)
-def mark_volumes(
-    marks: Marks, cut: Integers, sides: Sides, shape: Integers, wraps: Integers, component: int
-) -> None:
+def mark_volumes(marks: Marks, cut: Integers, sides: Sides, faces: FaceGrid) -> None:
     """Padded marks of the control volumes: CLEAR where no cut one is among the next GHOSTS along an
     axis, UPSTREAM on a free side of the domain, where means would draw in ever more, else CUT."""
     flat = marks.reshape(-1)
     flat[:] = CLEAR
-    mark_cut(marks, cut, shape, wraps, GHOSTS)
+    mark_cut(marks, cut, faces.shape, faces.wraps, GHOSTS)
     for s in range(sides.table.shape[0]):
         row = sides.table[s]
-        start, out, one, other, n, m, length = layer(row, marks, shape)
-        own = row[AXIS] == component
+        start, out, one, other, n, m, length = layer(row, marks, faces.shape)
+        own = row[AXIS] == faces.component
         period = (length - int(own)) * out
         for a in range(n):
             for b in range(m):
                 at_side = start + a * one + b * other
-                if row[BEYOND] == JOINED:
+                if row[NORMAL] == PERIODIC:
                     if own and not row[UPPER]:  # the last faces are the first ones
                         flat[at_side - period] = flat[at_side]
                     flat[at_side + out] = flat[at_side + out - period]
@@ -181,14 +187,15 @@ def mark_volumes(
                     continue
                 flat[at_side + out] = flat[at_side + 2 * out] = CUT
                 if own:
-                    flat[at_side] = UPSTREAM if row[FREE] else CUT
+                    flat[at_side] = UPSTREAM if row[NORMAL] == FREE else CUT
 
 
 @njit(nogil=True, cache=True)
-def side_rates(flux: Fluxes, index: Integers, component: int, shape: Integers) -> Array:
+def side_rates(flux: Fluxes, index: Integers, shape: Integers) -> Array:
     """(n, 6) volume per time that leaves control volumes through their sides: 2 axis for the lower
     one, 2 axis + 1 for the upper one."""
     rate, at, side = np.zeros((index.size, 6)), np.empty(3, np.int64), np.empty(3, np.int64)
+    component = flux.component
     for n in range(index.size):
         f = index[n]
         at[0], at[1], at[2] = f // (shape[1] * shape[2]), (f // shape[2]) % shape[1], f % shape[2]
@@ -208,18 +215,16 @@ def side_rates(flux: Fluxes, index: Integers, component: int, shape: Integers) -
 
 
 @njit(nogil=True, cache=True)
-def what_flows_out(
-    flux: Fluxes, listed: Integers, component: int, shape: Integers, inflows: Inflows,
-    given: Transfers,
-) -> Array:  # fmt: skip
+def what_flows_out(exchange: Exchange, listed: Integers, shape: Integers) -> Array:
     """(n,) volume per time that leaves listed control volumes through their sides, inlets and
     transfers."""
-    rate, total = side_rates(flux, listed, component, shape), np.zeros(listed.size)
+    rate, total = side_rates(exchange.flux, listed, shape), np.zeros(listed.size)
+    inlets, given = exchange.inlets, exchange.given
     for n in range(listed.size):
         for way in range(6):
             total[n] += max(rate[n, way], 0.0)
     for faces, out, sign in (
-        (inflows.faces, inflows.loss, 1.0),
+        (inlets.faces, inlets.loss, 1.0),
         (given.givers, given.volume, 1.0),
         (given.takers, given.volume, -1.0),
     ):
@@ -232,17 +237,17 @@ def what_flows_out(
 
 
 @njit(nogil=True, cache=True)
-def cross_sides(sides: Sides, flux: Fluxes, cells: Array, component: int, shape: Integers) -> None:
+def cross_sides(sides: Sides, flux: Fluxes, cells: Array, faces: FaceGrid) -> None:
     """Set what comes in through each side with each control volume beside it, and their shares in
     the volume of their layer, in place. The last faces along a periodic axis count as none.
 
     cells  volumes
     """
-    at = np.empty(3, np.int64)
+    at, (component, shape, wraps) = np.empty(3, np.int64), faces
     for s in range(sides.table.shape[0]):
         row = sides.table[s]
         axis, upper, first = row[AXIS], row[UPPER], row[FIRST]
-        if row[BEYOND] == JOINED:
+        if row[NORMAL] == PERIODIC:
             continue
         q, total = across_axis(flux.through, axis), 0.0
         one, other = int(axis == 0), 2 - int(axis == 2)
@@ -251,7 +256,7 @@ def cross_sides(sides: Sides, flux: Fluxes, cells: Array, component: int, shape:
             at[one], at[other] = n // shape[other], n % shape[other]
             at[axis] = upper * (shape[axis] - 1)
             line, through, held = at[component], 0.0, 0.0
-            if line == shape[component] - 1 and joined(sides.table, component):
+            if wraps[component] > 0 and line == wraps[component]:
                 continue
             for m in range(2):
                 at[component], part = flux.place[0, line, m], flux.share[0, line, m]
@@ -270,57 +275,40 @@ def cross_sides(sides: Sides, flux: Fluxes, cells: Array, component: int, shape:
 
 @njit(nogil=True, cache=True)
 def prepare(
-    marks: Marks,
-    cells: Array,
-    cut: Integers,
-    given: Transfers,
-    flux: Fluxes,
-    sides: Sides,
-    inflows: Inflows,
-    component: int,
-    shape: Integers,
-    wraps: Integers,
+    marks: Marks, cells: Array, cut: Integers, exchange: Exchange, faces: FaceGrid
 ) -> Array:
     """`Volumes.leaving`; the marks and what crosses the sides are set in place.
 
     cells  volumes at the start
     cut    see `Volumes`
     """
-    mark_volumes(marks, cut, sides, shape, wraps, component)
-    cross_sides(sides, flux, cells, component, shape)
-    return what_flows_out(flux, cut, component, shape, inflows, given)
+    mark_volumes(marks, cut, exchange.sides, faces)
+    cross_sides(exchange.sides, exchange.flux, cells, faces)
+    return what_flows_out(exchange, cut, faces.shape)
 
 
 @njit(nogil=True, cache=True)
-def joined(table: Integers, axis: int) -> bool:
-    """Whether an axis is periodic."""
-    found = False
-    for s in range(table.shape[0]):
-        found |= table[s, AXIS] == axis and table[s, BEYOND] == JOINED
-    return found
-
-
-@njit(nogil=True, cache=True)
-def draw_in(field: Array, marks: Marks, sides: Sides, shape: Integers) -> float:
+def draw_in(padded: Padded, sides: Sides, shape: Integers) -> float:
     """Give what comes in through free sides its velocity, the mean of the layer beside it or one
     without vorticity, in the ghosts of a padded field; gives volume x velocity that comes in
     through all sides per time."""
-    flat, mark, came = field.reshape(-1), marks.reshape(-1), 0.0
+    field, came = padded.values, 0.0
+    flat, mark = field.reshape(-1), padded.marks.reshape(-1)
     for s in range(sides.table.shape[0]):
         row = sides.table[s]
-        first = row[FIRST]
-        if row[BEYOND] == JOINED:
+        first, free = row[FIRST], row[NORMAL] == FREE
+        if row[NORMAL] == PERIODIC:
             continue
         start, out, one, other, n, m, _ = layer(row, field, shape)
         mean = 0.0
-        for a in range(n if row[FREE] else 0):
+        for a in range(n if free else 0):
             for b in range(m):
                 mean += sides.share[first + a * m + b] * flat[start + a * one + b * other]
         for a in range(n):
             for b in range(m):
                 at, rate = start + a * one + b * other, sides.rate[first + a * m + b]
                 upstream = mark[at] == UPSTREAM
-                if row[FREE] and rate > 0.0:
+                if free and rate > 0.0:
                     if row[IRROTATIONAL]:
                         flat[at + out] = flat[at] + sides.change[first + a * m + b]
                     else:
@@ -334,9 +322,7 @@ def draw_in(field: Array, marks: Marks, sides: Sides, shape: Integers) -> float:
 
 
 @njit(nogil=True, cache=True)
-def hold(
-    u: Array, volume: Array, sides: Sides, time: int, shape: Integers, component: int
-) -> float:
+def hold(u: Array, volume: Array, sides: Sides, time: int, faces: FaceGrid) -> float:
     """Give the faces of inflows across the component their own velocity, in place; gives volume
     times what that changes it by.
 
@@ -346,9 +332,9 @@ def hold(
     flat, volumes, given = u.reshape(-1), volume.reshape(-1), 0.0
     for s in range(sides.table.shape[0]):
         row = sides.table[s]
-        if not row[SUPPLIES] or row[AXIS] != component:
+        if not row[SUPPLIES] or row[AXIS] != faces.component:
             continue
-        start, _, one, other, n, m, _ = layer(row, u, shape)
+        start, _, one, other, n, m, _ = layer(row, u, faces.shape)
         for a in range(n):
             for b in range(m):
                 at, wanted = start + a * one + b * other, sides.wall[time, row[FIRST] + a * m + b]
@@ -358,24 +344,19 @@ def hold(
 
 
 @njit(nogil=True, cache=True)
-def empty_at_walls(
-    amount: Array, volume: Array, sides: Sides, shape: Integers, component: int, nothing: float
-) -> float:
+def empty_at_walls(now: Stage, sides: Sides, faces: FaceGrid) -> float:
     """Take from the faces of prescribed sides across the component what is left in control volumes
-    that a body has filled, in place; gives what that changes volume times velocity by.
-
-    amount  velocities, but volume times velocity where a control volume holds nothing
-    """
-    flat, volumes, given = amount.reshape(-1), volume.reshape(-1), 0.0
+    that a body has filled, in place; gives what that changes volume times velocity by."""
+    flat, volumes, given = now.later.reshape(-1), now.volume.reshape(-1), 0.0
     for s in range(sides.table.shape[0]):
         row = sides.table[s]
-        if row[FREE] or row[BEYOND] == JOINED or row[AXIS] != component:
+        if row[NORMAL] != PRESCRIBED or row[AXIS] != faces.component:
             continue
-        start, _, one, other, n, m, _ = layer(row, amount, shape)
+        start, _, one, other, n, m, _ = layer(row, now.later, faces.shape)
         for a in range(n):
             for b in range(m):
                 at = start + a * one + b * other
-                if volumes[at] <= nothing:
+                if volumes[at] <= now.nothing:
                     given -= flat[at]
                     flat[at] = 0.0
     return given
@@ -415,9 +396,9 @@ def settle(later: Array, high: Array, volumes: Volumes, span: float, nought: Arr
     for n in range(shut.size):
         was[n, 0], was[n, 1] = held[targets[n, 0]], held[targets[n, 1]]
         was[n, 2] = held[shut[n]]
-    join_small(later, high, shut, targets, volumes.shut.shares, volumes.nothing)
-    leaving, shape, wraps = span * volumes.leaving, volumes.shape, volumes.wraps
-    level(later, high, volumes.cut, leaving, nought, volumes.nothing, shape, wraps)
+    join_small(later, high, volumes.shut, volumes.nothing)
+    leaving = span * volumes.leaving
+    level(later, high, volumes.cut, leaving, nought, volumes.nothing, volumes.faces)
     for n in range(shut.size):
         held[targets[n, 0]], held[targets[n, 1]] = was[n, 0], was[n, 1]
         held[shut[n]] = was[n, 2]
@@ -428,28 +409,25 @@ def settle(later: Array, high: Array, volumes: Volumes, span: float, nought: Arr
 def fill_and_follow(u: Array, held: Array, volumes: Volumes, shut: Closed) -> None:
     """Give control volumes that hold nothing the velocity around them, closed ones that of their
     targets, and the last ones of a periodic axis that of the first ones, in place."""
-    fill_empty(u, held, volumes.cut, volumes.nothing, volumes.shape, volumes.wraps)
-    share_velocity(u, shut.faces, shut.targets, shut.shares)
-    if volumes.wraps[volumes.component] > 0:
-        join(u, volumes.component)
+    fill_empty(u, held, volumes.cut, volumes.nothing, volumes.faces)
+    share_velocity(u, shut)
+    if volumes.faces.wraps[volumes.faces.component] > 0:
+        join(u, volumes.faces.component)
 
 
 @njit(nogil=True, cache=True)
-def exchange(
-    later: Array, net: Array, volume: Array, padded: Array, inflows: Inflows, own: Array,
-    shape: Integers, dt: float, nothing: float,
-) -> None:  # fmt: skip
-    """Let through inlets what they bring to a padded field, in place; see `give`.
+def pass_inlets(now: Stage, padded: Array, inlets: Inlets, own: Array) -> None:
+    """Let through inlets what they bring to a padded field after a stage, in place.
 
     own  (n,) on return what leaves at each with the fluid's own velocity, per time
     """
-    after, gone, held = later.reshape(-1), net.reshape(-1), volume.reshape(-1)
+    flat, shape = in_line(now), now.later.shape
     for n in range(own.size):
-        f = inflows.faces[n]
+        f = inlets.faces[n]
         i, j, k = f // (shape[1] * shape[2]), (f // shape[2]) % shape[1], f % shape[2]
         i += (padded.shape[0] - shape[0]) // 2
-        own[n] = inflows.loss[n] * padded[i, j + GHOSTS, k + GHOSTS]
-        give(after, gone, held, f, own[n] - inflows.brought[n], dt, nothing)
+        own[n] = inlets.loss[n] * padded[i, j + GHOSTS, k + GHOSTS]
+        give(flat, f, own[n] - inlets.gain[n] * inlets.velocity[n])
 
 
 @kernel
@@ -459,25 +437,22 @@ def carry(
     along: Array,
     rising: float,
     volumes: Volumes,
-    flux: Fluxes,
-    sides: Sides,
-    inflows: Inflows,
+    exchange: Exchange,
     scratch: Scratch,
     dt: float,
-    count: int,
 ) -> tuple[float, float, Array]:
     """A component a step later, in `out`; gives the volume times velocity that came in through the
     sides, what inflows gave to what was carried to them, and (n,) what left at each inlet.
 
     u      at the start
     along  what else it is given, velocity per time, times `rising`
-    dt     s, of each of `count` substeps
+    dt     s, of each substep
     """
-    c, shape, nothing = volumes.component, volumes.shape, volumes.nothing
-    padded, marks, net, middle = scratch.padded, scratch.marks, scratch.net, scratch.middle
+    faces, sides, inlets = volumes.faces, exchange.sides, exchange.inlets
+    padded, middle, count = scratch.padded, scratch.middle, len(sides.wall) - 1
     start, later = (out, scratch.start) if count % 2 == 0 else (scratch.start, out)
     low = volumes.before
-    inlets, drained = np.zeros(inflows.faces.size), np.zeros(inflows.faces.size)
+    leaving, drained = np.zeros(inlets.faces.size), np.zeros(inlets.faces.size)
     crossed, held = 0.0, 0.0
     part_of_step(start, u, u, 0.0)
     fill_and_follow(start, low, volumes, volumes.was_shut)
@@ -490,25 +465,22 @@ def carry(
         for turn in range(2):
             weight = 1.0 - 0.5 * turn
             source, target = (start, middle) if turn == 0 else (middle, later)
+            now = Stage(target, scratch.net, high, weight, dt, volumes.nothing)
             if rising > 0.0 and s + turn > 0:
-                pad_field(padded, source, along, rising * (s + turn) * dt)
+                pad_field(padded.values, source, along, rising * (s + turn) * dt)
             else:
-                pad_field(padded, source, source, 0.0)
-            fill_ghosts(padded, sides, s + turn, shape, c)
-            came = draw_in(padded, marks, sides, shape)
-            stage(
-                target, net, weight, start, low, high, dt, nothing, padded, marks, flux.through, c,
-                flux.place, flux.share,
-            )  # fmt: skip
-            part, given = weight * dt, volumes.given
-            exchange(target, net, high, padded, inflows, inlets, shape, part, nothing)
-            add_transfers(target, net, high, source, given, part, nothing)
+                pad_field(padded.values, source, source, 0.0)
+            fill_ghosts(padded.values, sides, s + turn, faces)
+            came = draw_in(padded, sides, faces.shape)
+            stage(now, start, low, padded, exchange.flux)
+            pass_inlets(now, padded.values, inlets, leaving)
+            add_transfers(now, source, exchange.given)
             if turn == 1:
-                held += empty_at_walls(target, high, sides, shape, c, nothing)
+                held += empty_at_walls(now, sides, faces)
             settle(target, high, volumes, dt, scratch.nought)
             crossed += 0.5 * dt * came
-            drained += 0.5 * dt * inlets
+            drained += 0.5 * dt * leaving
         if s < count - 1:
-            held += hold(later, high, sides, s + 1, shape, c)
+            held += hold(later, high, sides, s + 1, faces)
             start, later, low = later, start, high
     return crossed, held, drained

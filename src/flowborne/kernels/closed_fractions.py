@@ -6,13 +6,18 @@ What several bodies close together is shared among them by what each closes alon
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 
-from flowborne.kernels.arrays import CLOSED, PERIODIC, Array, Integers
+from flowborne.kernels.arrays import PERIODIC, PRESCRIBED, Array, Faces, Integers, Nodes
+from flowborne.kernels.control_volumes import across_axis
 from flowborne.kernels.cut_faces import closed_face, crossing_from, is_cut, nodes_inside, other_axes
 from flowborne.kernels.edge_crossings import Crossings
 from flowborne.kernels.jit import inlined
+
+Index = tuple[int, int, int]
 
 CREASE = 0.02
 """Open part below which a face in a crease is closed. Bodies that overlap at a joint, or reach into
@@ -20,31 +25,49 @@ a side of the domain, press a cell that they never press in truth: what it has t
 through such a face, at a thousand times their speed."""
 
 
-@njit(nogil=True, cache=True)
-def close_faces(
-    own: Array, centre: Array, total: Array, phi: Array, found: Crossings, box: Integers, axis: int,
-    flat: bool,
-) -> None:  # fmt: skip
-    """What one body alone closes of each face across `axis` in its box; added to `total`, too.
+class Piece(NamedTuple):
+    """A body or flesh, or an image of it, on the grid, and what it alone closes of the faces there.
 
-    centre  (2, ...) of this part, from that of the face along the other axes, cells, in place
+    body       its number
+    box        (3, 2) ranges of nodes
+    nodes      displaced such that the body itself is there
+    distance   to it at the nodes of the box, m
+    crossings  of the edges between them
+    share      part of each face that it closes
+    centre     (2, ...) of that part, from that of the face along the other axes, cells
     """
+
+    body: int
+    box: Integers
+    nodes: Nodes
+    distance: Array
+    crossings: Crossings
+    share: Faces
+    centre: Faces
+
+
+@njit(nogil=True, cache=True)
+def close_faces(piece: Piece, total: Array, axis: int) -> None:
+    """What one body alone closes of each face across `axis` in its box, in place; added to `total`,
+    too."""
+    own, centre = across_axis(piece.share, axis), across_axis(piece.centre, axis)
+    box, flat, phi, found = piece.box, piece.nodes.flat, piece.distance, piece.crossings
     for i in range(own.shape[0]):
         for j in range(own.shape[1]):
             for k in range(own.shape[2]):
                 closed = 1.0 if phi[i, j, k] < 0.0 else 0.0
                 if is_cut(phi, found, axis, i, j, k):
-                    closed = closed_part(centre, (i, j, k), phi, found, axis, i, j, k, flat)
+                    closed = closed_part(centre, (i, j, k), phi, found, axis, (i, j, k), flat)
                 own[i, j, k] = closed
                 total[i + box[0, 0], j + box[1, 0], k + box[2, 0]] += closed
 
 
 @inlined
 def closed_part(
-    centre: Array, at: tuple[int, int, int], phi: Array, found: Crossings, axis: int, i: int,
-    j: int, k: int, flat: bool,
-) -> float:  # fmt: skip
-    """Closed part of face (i, j, k) across `axis`; its centre is written to `centre`, at `at`."""
+    centre: Array, at: Index, phi: Array, found: Crossings, axis: int, face: Index, flat: bool
+) -> float:
+    """Closed part of a face across `axis`; its centre is written to `centre`, at `at`."""
+    i, j, k = face
     closed, x, y, _, _, _ = closed_face(phi, found, axis, i, j, k, flat, False)
     for m in range(2 if closed > 0.0 else 0):
         centre[m, at[0], at[1], at[2]] = min(max((x, y)[m] / closed, -0.5), 0.5)
@@ -89,21 +112,25 @@ def in_a_crease(beside: Integers, axis: int, i: int, j: int, k: int, ring: bool)
 
 @njit(nogil=True, cache=True)
 def share_closed(
-    share: Array, centre: Array, opened: Array, total: Array, distance: Array, found: Crossings,
-    beside: Integers, box: Integers, axis: int, codes: Integers, flat: bool,
-) -> int:  # fmt: skip
-    """This body's part of each closed face in its box, and the open fractions; counts parts.
+    piece: Piece, opened: Array, total: Array, distance: Array, found: Crossings,
+    beside: Integers, axis: int, ends: Integers,
+) -> tuple[Integers, Array, Array]:  # fmt: skip
+    """This body's parts of the closed faces across `axis` in its box, and the open fractions.
 
-    share     what the body alone closes, overwritten;  centre  (2, ...) of it, see `close_faces`,
-              on return of what all bodies close
+    piece     with what the body alone closes, overwritten by its part of what all bodies close, and
+              the centres by those of that
     total     the sum of what each body alone closes
     distance, found  to all bodies at the nodes, and where edges cross any
     beside    (nx, ny, nz) how many bodies and solid sides bound each cell
-    codes     (2,) of the lower and upper side across `axis`: at a CLOSED one the side, not the
-              body, decides what crosses
+    ends      (2,) a of the velocity across the sides on `axis`: at a PRESCRIBED one the side, not
+              the body, decides what crosses
+    returns   (n,) flat indices of the faces, (n,) its parts, and (n, 2) their centres
     """
-    count = 0
-    last, ring = opened.shape[axis] - 1, codes[0] == PERIODIC
+    share, centre = across_axis(piece.share, axis), across_axis(piece.centre, axis)
+    box, flat, count = piece.box, piece.nodes.flat, 0
+    most, (_, nj, nk) = np.count_nonzero(share), opened.shape
+    faces, part, middle = np.empty(most, np.int64), np.empty(most), np.empty((most, 2))
+    last, ring = opened.shape[axis] - 1, ends[0] == PERIODIC
     for a in range(share.shape[0]):
         for b in range(share.shape[1]):
             for c in range(share.shape[2]):
@@ -113,7 +140,7 @@ def share_closed(
                     continue
                 union = own
                 if own != all_own:
-                    union = closed_part(centre, (a, b, c), distance, found, axis, i, j, k, flat)
+                    union = closed_part(centre, (a, b, c), distance, found, axis, (i, j, k), flat)
                 if union > 1.0 - CREASE and (
                     union > 1.0 - 1e-9 or in_a_crease(beside, axis, i, j, k, ring)
                 ):
@@ -121,46 +148,15 @@ def share_closed(
                     centre[:, a, b, c] = 0.0
                 opened[i, j, k] = 1.0 - union
                 n = i if axis == 0 else (j if axis == 1 else k)
-                if (n == 0 and codes[0] == CLOSED) or (n == last and codes[1] == CLOSED):
+                if (n == 0 and ends[0] == PRESCRIBED) or (n == last and ends[1] == PRESCRIBED):
                     share[a, b, c] = 0.0
                     continue
                 share[a, b, c] = union * own / all_own
-                count += int(share[a, b, c] > 0.0)
-    return count
-
-
-@njit(nogil=True, cache=True)
-def list_closed(
-    share: Array,
-    centre: Array,
-    box: Integers,
-    axis: int,
-    body: int,
-    counts: Integers,
-    at: int,
-    out_axis: Integers,
-    out_face: Integers,
-    out_body: Integers,
-    out_closed: Array,
-    out_centre: Array,
-) -> int:
-    """Write one body's closed parts across `axis`, and their centres, from position `at` on; gives
-    the next one."""
-    upper = box[:, 1] - 1
-    upper[axis] += 1
-    for i in range(box[0, 0], upper[0]):
-        for j in range(box[1, 0], upper[1]):
-            for k in range(box[2, 0], upper[2]):
-                a, b, c = i - box[0, 0], j - box[1, 0], k - box[2, 0]
-                closed = share[a, b, c]
-                if closed > 0.0:
-                    out_axis[at] = axis
-                    out_face[at] = (i * counts[1] + j) * counts[2] + k
-                    out_body[at] = body
-                    out_closed[at] = closed
-                    out_centre[at] = centre[:, a, b, c]
-                    at += 1
-    return at
+                if share[a, b, c] > 0.0:
+                    faces[count], part[count] = (i * nj + j) * nk + k, share[a, b, c]
+                    middle[count] = centre[:, a, b, c]
+                    count += 1
+    return faces[:count], part[:count], middle[:count]
 
 
 @njit(nogil=True, cache=True)

@@ -6,6 +6,8 @@ V r - Y (C J^T V r). All vectors are padded (see `levels`).
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import prange
 
@@ -37,6 +39,39 @@ LIMIT = 500
 
 STAGNATION = 0.5
 """A restart from the true residual that has not fallen below this times the last ends the solve."""
+
+
+class Matrix(NamedTuple):
+    """K + J A^-1 J^T + U diag(s) U^T.
+
+    finest    K on the finest level, with its diagonal
+    rows      of J with padded flat cells
+    mobility  A^-1, see `solvers.mobility`
+    beyond    U and s: padded flat cells, vectors, strengths; see `add_term`
+    label     region without an open side of each padded cell
+    null      null vectors, see `solvers.deflation.null_basis`
+    """
+
+    finest: Operator
+    rows: Rows
+    mobility: MobilityArrays
+    beyond: DenseTerm
+    label: Labels
+    null: Array
+
+
+class Preconditioner(NamedTuple):
+    """One V-cycle on K and a deflation, in its own precision, at any scale.
+
+    hierarchy        of K;  cycle  its x, b, r
+    fields, amounts  of the modes, see `solvers.deflation`
+    """
+
+    hierarchy: Hierarchy
+    cycle: Triple
+    fields: Real
+    amounts: Array
+
 
 LANES = 8
 """Partial sums of a scalar product, so that the compiler makes vector code of it."""
@@ -132,33 +167,20 @@ def apply_low_rank(out: Array, p: Array, rows: Rows, mobility: MobilityArrays) -
 
 @kernel
 def solve(
-    hierarchy: Hierarchy,
-    cycle: Triple,
-    finest: Operator,
+    matrix: Matrix,
+    preconditioner: Preconditioner,
     vectors: Vectors,
-    rows: Rows,
-    mobility: MobilityArrays,
-    beyond: DenseTerm,
-    label: Labels,
-    null: Array,
-    fields: Real,
-    amounts: Array,
     tolerance: float,
     absolute: float,
 ) -> tuple[int, float, bool]:
-    """Solve (K + J A^-1 J^T) x = rhs from the guess in x; all of it on one thread, or on all.
+    """Solve A x = rhs from the guess in x; all of it on one thread, or on all.
 
-    hierarchy  of K in the precision of the preconditioner, at any scale; cycle: its x, b, r
-    finest     K on the finest level, with its diagonal
-    vectors    padded x and rhs, scratch r, p, q with ghosts 0; rhs loses its part along the null
-               vectors, x as well at the end
-    rows       of J with padded flat cells; mobility: A^-1 (see `solvers.mobility`)
-    beyond     what belongs to K besides: padded flat cells, vectors, strengths; see `add_term`
-    null       see `solvers.pressure.null_basis`
-    fields, amounts  of the modes in the preconditioner, at the scale of the hierarchy; see
-               `solvers.pressure`
-    returns    iterations, |rhs - A x| / |rhs|, whether the residual asked for was reached
+    vectors  padded x and rhs, scratch r, p, q with ghosts 0; rhs loses its part along the null
+             vectors, x as well at the end
+    returns  iterations, |rhs - A x| / |rhs|, whether the residual asked for was reached
     """
+    finest, rows, mobility, beyond, label, null = matrix
+    hierarchy, cycle, fields, amounts = preconditioner
     table, periodic = hierarchy[0], hierarchy[1]
     x, rhs, r, p, q = vectors
     norm0 = np.sqrt(dot(rhs, rhs))

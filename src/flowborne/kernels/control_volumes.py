@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit, prange
 
-from flowborne.kernels.arrays import Array, Faces, Integers, Marks
+from flowborne.kernels.arrays import PERIODIC, PRESCRIBED, Array, FaceGrid, Faces, Integers, Marks
 from flowborne.kernels.faces import mean_row
 from flowborne.kernels.jit import inlined, kernel
 
@@ -104,13 +104,7 @@ def place_of(listed: Integers, f: int, near: int) -> int:
 
 @njit(nogil=True, cache=True)
 def find_targets(
-    small: Integers,
-    kinds: Marks,
-    opened: Array,
-    volumes: Array,
-    cells: Array,
-    component: int,
-    wraps: Integers,
+    small: Integers, kinds: Marks, opened: Array, volumes: Array, cells: Array, faces: FaceGrid
 ) -> tuple[Integers, Array]:
     """Targets (n, 2) of every small one, and which parts (n, 2) of it go with them; the small one
     itself where there is none.
@@ -127,7 +121,7 @@ def find_targets(
     cells    volume of each cell
     """
     targets, parts = np.empty((small.size, 2), np.int64), np.zeros((small.size, 2))
-    shape, cell_shape = np.array(opened.shape), np.array(cells.shape)
+    (component, shape, wraps), cell_shape = faces, np.array(cells.shape)
     volume_flat = volumes.reshape(-1)
     open_flat, cell_flat, pushed = opened.reshape(-1), cells.reshape(-1), kinds.reshape(-1)
     for n in range(small.size):
@@ -181,9 +175,9 @@ def find_targets(
 
 
 @njit(nogil=True, cache=True)
-def merge_small(amount: Array, small: Integers, targets: Integers, shares: Array) -> None:
-    """Give these shares (n, 2) of the amounts of small ones to their targets (n, 2), in place."""
-    flat = amount.reshape(-1)
+def merge_small(amount: Array, closed: Closed) -> None:
+    """Give the targets of closed ones their shares of what these have of an amount, in place."""
+    flat, (small, targets, shares) = amount.reshape(-1), closed
     for n in range(small.size):
         own = flat[small[n]]
         for m in range(2):
@@ -193,17 +187,15 @@ def merge_small(amount: Array, small: Integers, targets: Integers, shares: Array
 
 
 @njit(nogil=True, cache=True)
-def join_small(
-    field: Array, volumes: Array, small: Integers, targets: Integers, shares: Array, nothing: float
-) -> None:
-    """Give these shares (n, 2) of what small ones hold, and of their volumes, to their targets, in
+def join_small(field: Array, volumes: Array, closed: Closed, nothing: float) -> None:
+    """Give the targets of closed ones their shares of what these hold, and of their volumes, in
     place.
 
     field    value of each control volume, what is left of the amount where there is no volume above
              `nothing`
     volumes  of each
     """
-    flat, volume = field.reshape(-1), volumes.reshape(-1)
+    flat, volume, (small, targets, shares) = field.reshape(-1), volumes.reshape(-1), closed
     for n in range(small.size):
         g = small[n]
         room = volume[g]
@@ -220,7 +212,7 @@ def join_small(
 
 @njit(nogil=True, cache=True)
 def fill_empty(
-    field: Array, volumes: Array, listed: Integers, nothing: float, shape: Integers, wraps: Integers
+    field: Array, volumes: Array, listed: Integers, nothing: float, faces: FaceGrid
 ) -> None:
     """Give listed control volumes that hold nothing the mean of those beside them, in place."""
     flat, volume = field.reshape(-1), volumes.reshape(-1)
@@ -230,7 +222,7 @@ def fill_empty(
             continue
         total, weight = 0.0, 0.0
         for way in range(6):
-            to = neighbour(shape, wraps, f, way)
+            to = neighbour(faces.shape, faces.wraps, f, way)
             if to >= 0 and volume[to] > nothing:
                 total += volume[to] * flat[to]
                 weight += volume[to]
@@ -246,8 +238,7 @@ def level(
     leaving: Array,
     nought: Array,
     nothing: float,
-    shape: Integers,
-    wraps: Integers,
+    faces: FaceGrid,
 ) -> None:
     """Mix listed control volumes with the largest one beside them, in place, where far more leaves
     them than they hold.
@@ -270,7 +261,7 @@ def level(
             continue
         best, largest = -1, own
         for way in range(6):
-            to = neighbour(shape, wraps, f, way)
+            to = neighbour(faces.shape, faces.wraps, f, way)
             if to >= 0 and volume[to] > largest:
                 best, largest = to, volume[to]
         if best >= 0:
@@ -296,10 +287,11 @@ def level(
 
 
 @njit(nogil=True, cache=True)
-def share_velocity(field: Array, small: Integers, targets: Integers, shares: Array) -> None:
-    """Give small ones the velocity of all that goes with them, in place: these shares (n, 2) of
-    them go with their targets (n, 2)."""
-    flat, shared = field.reshape(-1), np.empty(small.size)
+def share_velocity(field: Array, closed: Closed) -> None:
+    """Give closed ones the velocity of all that goes with them, in place: their shares with their
+    targets."""
+    flat, (small, targets, shares) = field.reshape(-1), closed
+    shared = np.empty(small.size)
     for n in range(small.size):
         shared[n] = (1.0 - shares[n, 0] - shares[n, 1]) * flat[small[n]]
         shared[n] += shares[n, 0] * flat[targets[n, 0]] + shares[n, 1] * flat[targets[n, 1]]
@@ -358,8 +350,7 @@ def sort_faces(
     cells: Array,
     opened: Array,
     component: int,
-    prescribed: Marks,
-    periodic: bool,
+    ends: Integers,
     limits: tuple[float, float, float, float],
 ) -> None:
     """Control volumes of the faces of a component, V_f = (V_L + V_R) / 2, and their kinds.
@@ -367,14 +358,15 @@ def sort_faces(
     The first and last ones along its own axis are half as large, and the last is the first one
     where that is periodic: it counts as none.
 
-    kinds       see `kind_of`
-    counts      (n0 n1, 3) in each row how many are PART, SHUT and UNEVEN
-    prescribed  (2,) 1 where the velocity of the first or last layer is prescribed
-    limits      volume of a cell; part of it below which control volumes are cut; `slack` and
-                `nothing`, see `kind_of`
+    kinds   see `kind_of`
+    counts  (n0 n1, 3) in each row how many are PART, SHUT and UNEVEN
+    ends    (2,) a of the velocity on the first and the last layer, see `fluid.sides.side`
+    limits  volume of a cell; part of it below which control volumes are cut; `slack` and
+            `nothing`, see `kind_of`
     """
     n0, n1, n2 = opened.shape
     last, (cell, bound, slack, nothing) = opened.shape[component] - 1, limits
+    periodic = ends[0] == PERIODIC
     for row in prange(n0 * n1):
         i, j = np.int64(row) // n1, np.int64(row) % n1
         at = i if component == 0 else j
@@ -391,8 +383,8 @@ def sort_faces(
                 at = 1
             outer = at == 0 or at == last
             double = periodic and at == last
-            own = not double and not (at == 0 and prescribed[0])
-            own = own and not (at == last and prescribed[1])
+            own = not double and not (at == 0 and ends[0] == PRESCRIBED)
+            own = own and not (at == last and ends[1] == PRESCRIBED)
             least = bound * (0.0 if double else (0.5 if outer and not periodic else 1.0))
             goal = cell * (0.5 if outer and not periodic else 1.0)
             for k in range(start, stop):

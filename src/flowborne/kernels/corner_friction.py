@@ -17,7 +17,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from flowborne.kernels.arrays import Array, Integers, Marks
+from flowborne.kernels.arrays import Array, Integers
 from flowborne.kernels.cut_faces import (
     closed_face,
     crossings_on,
@@ -28,7 +28,7 @@ from flowborne.kernels.cut_faces import (
 )
 from flowborne.kernels.edge_crossings import Crossings
 from flowborne.kernels.jit import inlined
-from flowborne.kernels.viscosity import LEAST, UNKNOWN, nearest_node
+from flowborne.kernels.viscosity import LEAST, UNKNOWN, CutFaces, nearest_node
 
 SHARP = np.cos(np.radians(20.0))
 """Cosine of the least turn of a wall at a corner: round bodies are polygons that turn by less."""
@@ -210,20 +210,20 @@ def wall_at(beside: Integers, wall: Array, f: int) -> float:
 
 @njit(nogil=True, cache=True)
 def corner_stiffness(
-    axis: int, cells: Integers, corner: Array, kind: Marks, opened: Array, parts: Array,
-    links: Array, beside: Integers, wall: Array, stiffness: float, wraps: Integers, distance: Array,
+    known: CutFaces, cells: Integers, corner: Array, links: Array, beside: Integers, wall: Array,
+    wraps: Integers,
 ) -> tuple[Integers, Array, Integers]:  # fmt: skip
-    """What corners add to the matrix of the faces across `axis`, those at which all faces around
-    are unknown, and one wall is more along the axis and the other more across.
+    """What corners add to the matrix of faces, those at which all faces around are unknown, and one
+    wall is more along the axis and the other more across.
 
-    cells, corner  see `find_corners`;  kind, opened, parts, stiffness  see `link_faces`
+    cells, corner  see `find_corners`
     links          (3, ...) k to the next face along each axis, kg/s
     beside, wall   flat indices of the faces beside bodies, and W in their plane, kg/s
     wraps          see `face_at`
-    distance       to the bodies at the nodes
     returns        (n, AROUND) flat indices of the faces around; (n, AROUND, AROUND) kg/s; (n,) flat
                    index of the node of the cell nearest to a body
     """
+    axis, kind, distance, _, opened, _, parts, stiffness = known
     faces, node = np.empty((len(cells), AROUND), np.int64), np.empty(len(cells), np.int64)
     matrix = np.zeros((len(cells), AROUND, AROUND))
     count, own, at = 0, np.empty(AROUND, np.int64), np.empty(3, np.int64)
@@ -254,7 +254,7 @@ def corner_stiffness(
         narrow, beyond = open_parts[own[NARROW]], open_parts[own[BEYOND]]
         volume = max(parts[cells[c, 0], cells[c, 1], cells[c, 2]], LEAST * max(narrow, beyond))
         link, stride = links[d].reshape(-1), (nj * nk, nk, 1)[d]
-        known = (
+        between = (
             link_between(link, own[NARROW], own[BESIDE], stride) / stiffness,
             link_between(link, own[BEYOND], own[NEXT], stride) / stiffness,
             link_between(link, own[BEYOND], own[BEHIND], stride) / stiffness,
@@ -268,7 +268,7 @@ def corner_stiffness(
             stays = 1.0
         for in_row, share in ((False, 1.0 - stays), (True, stays)):
             if share > 0.0:
-                form = corner_form(narrow, beyond, volume, b, h, in_row, known, walls)
+                form = corner_form(narrow, beyond, volume, b, h, in_row, between, walls)
                 matrix[count] += share * stiffness * form[:AROUND, :AROUND]
         if own[BEHIND] < 0:
             own[BEHIND] = own[BEYOND]  # to which nothing is added

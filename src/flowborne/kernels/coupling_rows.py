@@ -9,7 +9,8 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
-from flowborne.kernels.arrays import Array, Faces, Integers, Rows
+from flowborne.kernels.arrays import PRESCRIBED, Array, Integers, Rows
+from flowborne.kernels.closed_fractions import Piece
 from flowborne.kernels.jit import inlined, kernel
 
 Kinds = NDArray[np.int8]
@@ -39,26 +40,26 @@ class ClosedParts(NamedTuple):
 
 
 @inlined
-def through(walls: Integers, axis: int, end: int, at_end: bool) -> float:
-    """0 for a face on a side that is solid or an inflow, 1 for others."""
-    return 0.0 if at_end and walls[axis, end] == 1 else 1.0
+def through(normal: Integers, axis: int, end: int, at_end: bool) -> float:
+    """0 for a face on a side that prescribes the flux through it, 1 for others."""
+    return 0.0 if at_end and normal[axis, end] == PRESCRIBED else 1.0
 
 
 @kernel
-def kinds_of_cells(ox: Array, oy: Array, oz: Array, walls: Integers) -> Kinds:
+def kinds_of_cells(ox: Array, oy: Array, oz: Array, normal: Integers) -> Kinds:
     """(nx, ny, nz) kind of each cell.
 
-    walls  (3, 2) 1 where the lower or upper side across an axis is solid or an inflow
+    normal  (3, 2) a of the velocity across the sides, see `fluid.sides.side`
     """
     n0, n1, n2 = oy.shape[0], ox.shape[1], ox.shape[2]
     kind = np.empty((n0, n1, n2), np.int8)
-    first, last = through(walls, 2, 0, True), through(walls, 2, 1, True)
+    first, last = through(normal, 2, 0, True), through(normal, 2, 1, True)
     for i in prange(n0):
-        below0 = through(walls, 0, 0, i == 0)
-        above0 = through(walls, 0, 1, i == n0 - 1)
+        below0 = through(normal, 0, 0, i == 0)
+        above0 = through(normal, 0, 1, i == n0 - 1)
         for j in range(n1):
-            below1 = through(walls, 1, 0, j == 0)
-            above1 = through(walls, 1, 1, j == n1 - 1)
+            below1 = through(normal, 1, 0, j == 0)
+            above1 = through(normal, 1, 1, j == n1 - 1)
             beside = below0 + above0 + below1 + above1 < 4.0
             for k in range(n2):
                 widest = max(below0 * ox[i, j, k], above0 * ox[i + 1, j, k])
@@ -76,23 +77,13 @@ def kinds_of_cells(ox: Array, oy: Array, oz: Array, walls: Integers) -> Kinds:
 
 
 @njit(nogil=True, cache=True)
-def cell_wrench(
-    wrench: Array,
-    i: int,
-    j: int,
-    k: int,
-    share: Faces,
-    centre: Faces,
-    box: Integers,
-    origin: Array,
-    h: float,
-    area: float,
-    flat: bool,
-) -> None:
-    """Wrench of unit pressure in cell (i, j, k) on the body whose shares are given: what acts on
-    a closed part of a face acts at its centre."""
+def cell_wrench(wrench: Array, i: int, j: int, k: int, piece: Piece) -> None:
+    """Wrench of unit pressure in cell (i, j, k) on the body: what acts on a closed part of a face
+    acts at its centre."""
+    box, (origin, h, flat) = piece.box, piece.nodes
+    (sx, sy, sz), (cx, cy, cz) = piece.share, piece.centre
+    area = h if flat else h * h
     a, b, c = i - box[0, 0], j - box[1, 0], k - box[2, 0]
-    (sx, sy, sz), (cx, cy, cz) = share, centre
     x, y = origin[0] + h * (i + 0.5), origin[1] + h * (j + 0.5)
     z = 0.0 if flat else origin[2] + h * (k + 0.5)
     wrench[:] = 0.0
@@ -114,31 +105,14 @@ def cell_wrench(
 
 
 @njit(nogil=True, cache=True)
-def list_cells(
-    share: Faces,
-    centre: Faces,
-    listed: NDArray[np.bool_],
-    box: Integers,
-    body: int,
-    origin: Array,
-    h: float,
-    area: float,
-    flat: bool,
-    at: int,
-    cells: Integers,
-    columns: Integers,
-    values: Array,
-) -> int:
-    """Write the coupling rows of one body in listed cells from row `at` on; gives the next one.
-
-    With `cells` of length 0 it only counts. Where the body closes as much on either side of a cell,
-    at the same place, it has no row.
-
-    share   what the body closes of each face in its box
-    centre  (2, ...) of what is closed, see `close_faces`
-    """
-    wrench, (sx, sy, sz) = np.empty(6), share
-    n = listed.shape
+def list_cells(piece: Piece, listed: NDArray[np.bool_]) -> tuple[Integers, Array]:
+    """Listed cells (n,) with a coupling row of one body, flat, and (n, 6) its values, the wrench of
+    unit pressure. Where the body closes as much on either side of a cell, at the same place, it has
+    no row."""
+    box, flat, (sx, sy, sz) = piece.box, piece.nodes.flat, piece.share
+    n, at = listed.shape, 0
+    most = 2 * int(np.count_nonzero(sx) + np.count_nonzero(sy) + np.count_nonzero(sz))
+    wrench, cells, values = np.empty(6), np.empty(most, np.int64), np.empty((most, 6))
     for i in range(box[0, 0], box[0, 1] - 1):
         for j in range(box[1, 0], box[1, 1] - 1):
             for k in range(box[2, 0], box[2, 1] - 1):
@@ -148,15 +122,11 @@ def list_cells(
                     closed += sz[a, b, c] + sz[a, b, c + 1]
                 if closed == 0.0 or not listed[i, j, k]:
                     continue
-                cell_wrench(wrench, i, j, k, share, centre, box, origin, h, area, flat)
+                cell_wrench(wrench, i, j, k, piece)
                 if wrench.any():
-                    if cells.size:
-                        cells[at] = (i * n[1] + j) * n[2] + k
-                        for m in range(6):
-                            columns[6 * at + m] = 6 * body + m
-                            values[6 * at + m] = wrench[m]
+                    cells[at], values[at] = (i * n[1] + j) * n[2] + k, wrench
                     at += 1
-    return at
+    return cells[:at], values[:at]
 
 
 @njit(nogil=True, cache=True)

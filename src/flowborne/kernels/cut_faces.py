@@ -157,14 +157,15 @@ def between(p: Place, q: Place, part: float) -> Place:
 
 @njit(nogil=True, cache=True)
 def add_wall(
-    sums: Array, p: Place, q: Place, e: int, f: int, found: Crossings, s: int, t: int,
+    sums: Array, p: Place, q: Place, e: int, f: int, found: Crossings, axes: tuple[int, int],
     straight: bool,
 ) -> int:  # fmt: skip
     """Add the wall from crossing e at p to crossing f at q, of which nothing is known below 0, to
     the sums of `add_line`, and its corner's place to the last two; gives how many corners it has.
 
-    s, t  axes of the face
+    axes  of the face
     """
+    s, t = axes
     if straight or e < 0 or f < 0:
         add_line(sums, p, q)
         return 0
@@ -253,10 +254,10 @@ def closed_face(
         if not (begins or ends or joined):
             if first:
                 add_line(sums, enters, leaves)
-                corners += add_wall(sums, leaves, enters, g, f, found, s, t, straight)
+                corners += add_wall(sums, leaves, enters, g, f, found, (s, t), straight)
             continue
         if not begins and waits:
-            corners += add_wall(sums, p, enters, exit, f, found, s, t, straight)
+            corners += add_wall(sums, p, enters, exit, f, found, (s, t), straight)
             waits = False
         if first:
             add_line(sums, enters, leaves)

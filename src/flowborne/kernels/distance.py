@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from flowborne.kernels.arrays import Array, Integers
+from flowborne.kernels.arrays import Array, Integers, Point
 
 SPHERE, CAPSULE, CYLINDER, BOX, ELLIPSOID, MESH = range(6)
 
@@ -58,15 +58,14 @@ def distance_in_table(
 def signed_distance(
     kind: int,
     size: Array,
-    x: float,
-    y: float,
-    z: float,
+    point: Point,
     tables: Array,
     table: Integers,
     corner: Array,
     pitch: float,
 ) -> float:
     """Signed distance of a point in the geometry's frame, negative inside, m."""
+    x, y, z = point
     if kind == SPHERE:
         return float(np.sqrt(x * x + y * y + z * z) - size[0])
     if kind == CAPSULE:
@@ -92,8 +91,8 @@ def distances(kind: int, size: Array, points: Array) -> Array:
         if kind == ELLIPSOID:
             distance[i] = distance_off_ellipsoid(points[i], size)
         else:
-            x, y, z = points[i]
-            distance[i] = signed_distance(kind, size, x, y, z, none, table, nowhere, 1.0)
+            point = points[i, 0], points[i, 1], points[i, 2]
+            distance[i] = signed_distance(kind, size, point, none, table, nowhere, 1.0)
     return distance
 
 

@@ -16,10 +16,12 @@ closed face. Lists are of the cut cells, in ascending order; `way` is 2 axis for
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit, prange
 
-from flowborne.kernels.arrays import ROUNDING, Array, Integers, Marks
+from flowborne.kernels.arrays import ROUNDING, Array, Faces, Integers, Marks
 from flowborne.kernels.control_volumes import neighbour, place_of
 from flowborne.kernels.jit import inlined, kernel
 
@@ -30,6 +32,9 @@ ALIKE = 1.25
 """Second differences of a parabola per smallest one around it above which it is not smooth."""
 
 TINY = 1e-300
+
+Bounds = tuple[float, float]
+"""Least and largest value."""
 
 
 @inlined
@@ -92,21 +97,19 @@ def sweep(
     ends: Array,
     wraps: bool,
     dt: float,
-    least: float,
-    most: float,
-    crossed: Array,
-) -> None:
-    """Carry a field along the second of its axes, in place.
+    bounds: Bounds,
+) -> Array:
+    """Carry a field along the second of its axes, in place; gives the amounts through both ends.
 
-    field        (m, n, l) values of the cells
-    volume       (m, n, l) of the cells, in place
-    flux         (m, n+1, l) volume per time through the faces
-    clear        (m, n, l) see `bend_row`
-    ends         (2, m, l) values beyond both sides, where the axis does not wrap
-    least, most  bounds of all values
-    crossed      (2, m, l) amounts through both sides along the axis, added to
+    field   (m, n, l) values of the cells
+    volume  (m, n, l) of the cells, in place
+    flux    (m, n+1, l) volume per time through the faces
+    clear   (m, n, l) see `bend_row`
+    ends    (2, m, l) values beyond both sides, where the axis does not wrap
+    bounds  of all values
+    returns (2, m, l)
     """
-    m, n, count = field.shape
+    (m, n, count), (least, most), crossed = field.shape, bounds, np.zeros(ends.shape)
     strips = (count + WIDTH - 1) // WIDTH
     for block in prange(m * strips):
         i, start = np.int64(block) // strips, (np.int64(block) % strips) * WIDTH
@@ -153,7 +156,8 @@ def sweep(
                     volume[i, j - 1, start + k] = left
             if j == 0 or j == n:
                 for k in range(w):
-                    crossed[min(j, 1), i, start + k] += amount[here, k]
+                    crossed[min(j, 1), i, start + k] = amount[here, k]
+    return crossed
 
 
 WHOLE, CUT, EMPTY = range(3)
@@ -166,26 +170,18 @@ rounding errors change."""
 
 @kernel
 def sort_cells(
-    kind: Marks,
-    fullest: Array,
-    before: Array,
-    after: Array,
-    rate: Array,
-    x: Array,
-    y: Array,
-    z: Array,
-    whole: float,
-) -> None:
-    """Tell the kind of each cell, and the largest part of a whole one that leaves it per time.
+    before: Array, after: Array, rate: Array, flux: Faces, whole: float
+) -> tuple[Marks, Array]:
+    """Kind of each cell (nx, ny, nz), WHOLE, CUT or EMPTY, and of each plane (nx,) the largest part
+    of a whole one that leaves it per time. Cells that mouths and sources fill are CUT.
 
-    kind           (nx, ny, nz) WHOLE, CUT or EMPTY; cells that mouths and sources fill are CUT
-    fullest        (nx,) of each plane
     before, after  volumes at both ends of the step
     rate           volume per time that mouths and sources bring
-    x, y, z        volume per time through the faces across each axis
+    flux           volume per time through the faces across each axis
     whole          volume from which a cell is whole
     """
-    n0, n1, n2 = kind.shape
+    (n0, n1, n2), (x, y, z) = rate.shape, flux
+    kind, fullest = np.empty((n0, n1, n2), np.uint8), np.empty(n0)
     for i in prange(n0):
         most = 0.0
         for j in range(n1):
@@ -203,6 +199,22 @@ def sort_cells(
                 kind[i, j, k] = WHOLE if clear else (EMPTY if nothing else CUT)
                 most = max(most, out / max(least, whole) if clear else 0.0)
         fullest[i] = most
+    return kind, fullest
+
+
+class CutCells(NamedTuple):
+    """Cut cells and the flow through their faces.
+
+    listed  (n,) flat
+    beside  (n, 6) flat index of the cell beside, -1 beyond a side
+    row     (n, 6) its place in the list, -1 if it is not there
+    out     (n, 6) volume that leaves through each face, per time or in a step
+    """
+
+    listed: Integers
+    beside: Integers
+    row: Integers
+    out: Array
 
 
 @njit(nogil=True, cache=True)
@@ -217,26 +229,15 @@ def face_of(shape: Integers, axis: int, f: int, upper: int) -> int:
 
 
 @njit(nogil=True, cache=True)
-def list_flows(
-    listed: Integers,
-    axis: int,
-    flux: Array,
-    wraps: Integers,
-    shape: Integers,
-    beside: Integers,
-    row: Integers,
-    out: Array,
-) -> None:
-    """Take the faces of cut cells across an axis out of the fluxes.
+def list_flows(cells: CutCells, axis: int, flux: Array, wraps: Integers, shape: Integers) -> None:
+    """Take the faces of cut cells across an axis out of the fluxes, and write what is beside and
+    leaves there.
 
-    flux    volume per time through the faces across the axis; 0 at those of cut cells afterwards
-    wraps   (3,) number of cells along each periodic axis, else 0
-    shape   (3,) of the cells
-    beside  (n, 6) flat index of the cell beside, -1 beyond a side
-    row     (n, 6) its place in the list, -1 if it is not there
-    out     (n, 6) volume per time that leaves through each face
+    flux   volume per time through the faces across the axis; 0 at those of cut cells afterwards
+    wraps  (3,) number of cells along each periodic axis, else 0
+    shape  (3,) of the cells
     """
-    through = flux.reshape(-1)
+    (listed, beside, row, out), through = cells, flux.reshape(-1)
     for n in range(listed.size):
         for upper in range(2):
             way, to = 2 * axis + upper, neighbour(shape, wraps, listed[n], 2 * axis + upper)
@@ -256,28 +257,25 @@ def list_flows(
 def pass_on(
     field: Array,
     volume: Array,
-    listed: Integers,
-    beside: Integers,
-    row: Integers,
-    out: Array,
+    cells: CutCells,
     entering: Array,
     gain: Array,
     brought: Array,
     local: Array,
-    least: float,
-    most: float,
+    bounds: Bounds,
 ) -> float:
     """Carry a field through the faces of cut cells, in place; gives the amount that came in through
     sides of the domain, mouths and sources.
 
     volume    (nx, ny, nz) of the cells, in place
-    out       (n, 6) volume that leaves through each face in the step
+    cells     and what leaves them in the step
     entering  (n, 6) value of what comes in through sides of the domain
     gain      (n,) volume that mouths bring with
     brought   (n,) amount
     local     (n,) volume that comes in with the value that is there; negative leaves
-    least, most  bounds of all values, which a volume below 0 would break by as little as it is
+    bounds    of all values, which a volume below 0 would break by as little as it is
     """
+    (listed, beside, row, out), (least, most) = cells, bounds
     values, volumes = field.reshape(-1), volume.reshape(-1)
     count = listed.size
     came, known = gain.copy(), brought.copy()

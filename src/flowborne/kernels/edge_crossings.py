@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from flowborne.kernels.arrays import Array, Indices, Integers
+from flowborne.kernels.arrays import Array, Indices, Integers, Nodes
 from flowborne.kernels.distance import BOX, CYLINDER, signed_distance
 from flowborne.kernels.jit import inlined
 
@@ -76,9 +76,8 @@ def distance_to(body: Placed, x: float, y: float, z: float) -> float:
     lx = rotation[0, 0] * dx + rotation[1, 0] * dy + rotation[2, 0] * dz
     ly = rotation[0, 1] * dx + rotation[1, 1] * dy + rotation[2, 1] * dz
     lz = rotation[0, 2] * dx + rotation[1, 2] * dy + rotation[2, 2] * dz
-    return signed_distance(
-        body.kind, body.size, lx, ly, lz, body.tables, body.table, body.corner, body.pitch
-    )
+    sampled = body.tables, body.table, body.corner, body.pitch
+    return signed_distance(body.kind, body.size, (lx, ly, lz), *sampled)
 
 
 @njit(nogil=True, cache=True)
@@ -115,19 +114,20 @@ def together(shape: tuple[int, ...], each: Sequence[Crossings]) -> Crossings:
 
 @njit(nogil=True, cache=True)
 def add_crossing(
-    found: Crossings, used: Integers, d: int, i: int, j: int, k: int, twice: bool, upper: bool,
+    found: Crossings, used: Integers, edge: tuple[int, int, int, int], twice: bool, upper: bool,
     part: float, normal: Array, piece: int,
 ) -> None:  # fmt: skip
     """Note a crossing, if none is nearer to the open node of its edge.
 
     used   (1,) how many numbers are taken
+    edge   its axis, and the indices of its lower node
     twice  whether both nodes are open;  upper  whether this is the one next to the upper
     """
-    n = found.at[d, i, j, k]
+    n = found.at[edge]
     if n < 0:
         n = used[0]
         assert n + int(twice) < found.part.size
-        found.at[d, i, j, k] = n
+        found.at[edge] = n
         used[0] += 1 + int(twice)
         found.part[n : used[0]] = np.inf
     n += int(upper)
@@ -139,13 +139,13 @@ def add_crossing(
 @njit(nogil=True, cache=True)
 def cross_geometry(
     found: Crossings, used: Integers, phi: Array, box: Integers, body: Placed, number: int,
-    origin: Array, h: float, flat: bool,
+    nodes: Nodes,
 ) -> None:  # fmt: skip
     """Note where edges cross a geometry, this `number`, of a body.
 
     phi  distance to the body at the nodes of its box, m;  box  (3, 2) node ranges
     """
-    point, normal = np.empty(3), np.empty(3)
+    point, normal, (origin, h, flat) = np.empty(3), np.empty(3), nodes
     ni, nj, nk = phi.shape
     for i in range(ni):
         for j in range(nj):
@@ -179,9 +179,8 @@ def cross_geometry(
                         if part >= 0.0:
                             piece = number * PIECES + surface_at(body, point, SHIFT * h, normal)
                             at_upper = twice and upper > 0
-                            add_crossing(
-                                found, used, d, i, j, k, twice, at_upper, part, normal, piece
-                            )
+                            edge = d, i, j, k
+                            add_crossing(found, used, edge, twice, at_upper, part, normal, piece)
 
 
 @njit(nogil=True, cache=True)

@@ -6,10 +6,12 @@ neighbour below along an axis and 2 axis + 1 for the one above.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 
-from flowborne.kernels.arrays import Array, Faces, Integers, Marks
+from flowborne.kernels.arrays import Array, FaceGrid, Faces, Integers, Marks
 from flowborne.kernels.control_volumes import (
     DRIVEN,
     LISTED,
@@ -20,6 +22,7 @@ from flowborne.kernels.control_volumes import (
     neighbour,
     place_of,
 )
+from flowborne.kernels.flux import Stage, in_line
 
 KEPT = 0.5
 """Part of the smaller of what one holds and of a h^3 that it keeps at least in a sweep."""
@@ -32,9 +35,23 @@ stream (rms) with 8, 16, 32 cells to its diameter; with one round by 0.046, 0.04
 by 0.061, 0.030, 0.018, and by 0.115, 0.135, 0.121 where control volumes keep what they have."""
 
 
+class Openings(NamedTuple):
+    """What is open between listed control volumes along one axis.
+
+    above  (n,) place in the list of the control volume above each, -1 if it is not there
+    way    (n,) opening w of the way to it
+    rest   (n,) w a of the others beside each
+    """
+
+    above: Integers
+    way: Array
+    rest: Array
+
+
 @njit(nogil=True, cache=True)
-def cell_beside(f: int, way: int, shape: Integers, wraps: Integers, component: int) -> int:
+def cell_beside(f: int, way: int, faces: FaceGrid) -> int:
     """Flat index of the cell on one side of face f of a component; -1 beyond the domain."""
+    component, shape, wraps = faces
     n1, n2 = shape[1], shape[2]
     i, j, k = f // (n1 * n2), (f // n2) % n1, f % n2
     at = (i, j, k)[component] - 1 + way % 2
@@ -51,14 +68,13 @@ def cell_beside(f: int, way: int, shape: Integers, wraps: Integers, component: i
 
 
 @njit(nogil=True, cache=True)
-def face_between(
-    f: int, way: int, low: int, shape: Integers, wraps: Integers, component: int, across: Integers
-) -> int:
+def face_between(f: int, way: int, low: int, faces: FaceGrid, across: Integers) -> int:
     """Flat index of one of the two faces between control volume f and the one beside it along
     another axis: that at the lower (0) or upper (1) of its cells; -1 beyond the domain.
 
     across  (3,) shape of the faces across that axis
     """
+    component, shape, wraps = faces
     n1, n2 = shape[1], shape[2]
     axis = way // 2
     at = (f // (n1 * n2), (f // n2) % n1, f % n2)
@@ -77,56 +93,52 @@ def face_between(
 def openings(
     listed: Integers,
     kinds: Marks,
-    component: int,
     axis: int,
-    own: Array,
+    opened: Faces,
     cells: Array,
     cell: float,
-    across: Array,
-    shape: Integers,
-    wraps: Integers,
-) -> tuple[Integers, Array, Array]:
-    """Place in the list (n,) of the control volume above each along an axis, -1 if it is not there,
-    the opening w (n,) of the way to it, and what w a of others than listed ones is beside each.
+    faces: FaceGrid,
+) -> Openings:
+    """What is open between listed control volumes along an axis.
 
     w is the open part of the cell between both along the component's own axis, elsewhere the mean
     of the two faces between them times the smaller one of their own.
 
     kinds   of the faces
-    own     open part of each face of the component
+    opened  open part of each
     cells   open volume of each cell
     cell    volume of a whole one
-    across  open part of the faces across the axis
     """
     above, way, rest = np.empty(listed.size, np.int64), np.zeros(listed.size), np.zeros(listed.size)
-    faces, room, sides = own.reshape(-1), cells.reshape(-1), across.reshape(-1)
+    across, room = across_axis(opened, axis), cells.reshape(-1)
+    own, sides = across_axis(opened, faces.component).reshape(-1), across.reshape(-1)
     wide, near = np.array(across.shape), [0, 0]
     for n in range(listed.size):
         f, above[n] = listed[n], -1
         for side in range(2):
-            to = neighbour(shape, wraps, f, 2 * axis + side)
+            to = neighbour(faces.shape, faces.wraps, f, 2 * axis + side)
             if to < 0:
                 continue
             at = near[side] = place_of(listed, to, near[side])
             there = at < listed.size and listed[at] == to
             if there and side == 0:
                 continue
-            if axis == component:
-                part = room[cell_beside(f, side, shape, wraps, component)] / cell
+            if axis == faces.component:
+                part = room[cell_beside(f, side, faces)] / cell
                 opening = min(max(part, 0.0), 1.0)
             else:
                 total, count = 0.0, 0
                 for low in range(2):
-                    between = face_between(f, 2 * axis + side, low, shape, wraps, component, wide)
+                    between = face_between(f, 2 * axis + side, low, faces, wide)
                     if between >= 0:
                         total += sides[between]
                         count += 1
-                opening = total / count * min(faces[f], faces[to])
+                opening = total / count * min(own[f], own[to])
             if there:
                 above[n], way[n] = at, opening
             elif kinds.reshape(-1)[to] & DRIVEN:
-                rest[n] += opening * faces[to]
-    return above, way, rest
+                rest[n] += opening * own[to]
+    return Openings(above, way, rest)
 
 
 @njit(nogil=True, cache=True)
@@ -134,9 +146,7 @@ def even_out(
     held: Array,
     goal: Array,
     opened: Array,
-    above: Integers,
-    way: Array,
-    rest: Array,
+    between: Openings,
     share: float,
     passed: Array,
     gained: Array,
@@ -150,8 +160,9 @@ def even_out(
     of both neighbours' excess. What is added up here has the same bits from either side, so that
     what is symmetric stays so.
 
-    opened  (n,) a;  goal  (n,) a h^3;  above, way, rest  see `openings`
+    opened  (n,) a;  goal  (n,) a h^3
     """
+    above, way, rest = between
     count, reach = held.size, rest.copy()
     given, out, more = np.zeros(count), np.zeros(count), np.zeros(count)
     for n in range(count):
@@ -185,43 +196,30 @@ def even_out(
 
 
 @njit(nogil=True, cache=True)
-def give(
-    later: Array, net: Array, volume: Array, f: int, more: float, dt: float, nothing: float
-) -> None:
-    """Let more of its amount per time leave one control volume, in place; all flat.
-
-    later   value after a stage of dt, what is left of the amount where `volume` is not above
-            `nothing`
-    net     amount that leaves per time
-    volume  after the stage
-    """
-    net[f] += more
-    later[f] -= dt * more / (volume[f] if volume[f] > nothing else 1.0)
+def give(now: Stage, f: int, more: float) -> None:
+    """Let more of its amount per time leave one control volume after a stage, flat, in place."""
+    now.net[f] += more
+    volume = now.volume[f] if now.volume[f] > now.nothing else 1.0
+    now.later[f] -= now.weight * now.dt * more / volume
 
 
 @njit(nogil=True, cache=True)
-def add_transfers(
-    later: Array,
-    net: Array,
-    volume: Array,
-    field: Array,
-    given: Transfers,
-    dt: float,
-    nothing: float,
-) -> None:
-    """Let what transfers take leave control volumes and come to others, in place: volume per time
-    x mean velocity of both, which changes no energy. See `give`."""
-    after, leaving, held = later.reshape(-1), net.reshape(-1), volume.reshape(-1)
-    values = field.reshape(-1)
+def add_transfers(now: Stage, field: Array, given: Transfers) -> None:
+    """Let what transfers take leave control volumes and come to others after a stage, in place:
+    volume per time x mean velocity of both, which changes no energy.
+
+    field  the component that is carried along
+    """
+    flat, values = in_line(now), field.reshape(-1)
     for n in range(given.givers.size):
         f, g = given.givers[n], given.takers[n]
         passed = given.volume[n] * 0.5 * (values[f] + values[g])
-        give(after, leaving, held, f, passed, dt, nothing)
-        give(after, leaving, held, g, -passed, dt, nothing)
+        give(flat, f, passed)
+        give(flat, g, -passed)
 
 
 @njit(nogil=True, cache=True)
-def with_neighbours(cut: Integers, kinds: Marks, shape: Integers, wraps: Integers) -> Integers:
+def with_neighbours(cut: Integers, kinds: Marks, faces: FaceGrid) -> Integers:
     """The listed ones, and then those beside them on which pressure acts.
 
     kinds  of the faces; on return LISTED too where a face is in the list
@@ -233,7 +231,7 @@ def with_neighbours(cut: Integers, kinds: Marks, shape: Integers, wraps: Integer
         kind[cut[n]] |= LISTED
     for f in cut:
         for way in range(6):
-            to = neighbour(shape, wraps, f, way)
+            to = neighbour(faces.shape, faces.wraps, f, way)
             if to >= 0 and kind[to] & DRIVEN and not kind[to] & LISTED:
                 kind[to] |= LISTED
                 found[count] = to
@@ -249,8 +247,7 @@ def share_out(
     listed: Integers,
     cells: Array,
     opened: Faces,
-    component: int,
-    wraps: Integers,
+    faces: FaceGrid,
     cell: float,
 ) -> Transfers:
     """What control volumes of a component give to others, taken from `volume` and added to it, in
@@ -261,8 +258,9 @@ def share_out(
     cells   volumes
     cell    that of a whole one
     """
-    own, shape = across_axis(opened, component), np.array(volume.shape)
-    flat, part_flat, size = volume.reshape(-1), own.reshape(-1), listed.size
+    component, shape, wraps = faces
+    flat, part_flat = volume.reshape(-1), across_axis(opened, component).reshape(-1)
+    size = listed.size
     stride = shape[1] * shape[2] if component == 0 else (shape[2] if component == 1 else 1)
     part, held, aim = np.empty(size), np.empty(size), np.empty(size)
     for n in range(size):
@@ -275,19 +273,16 @@ def share_out(
     for m in range(3):
         axis = component if m == 0 else m - int(m <= component)
         if shape[axis] > 1:
-            above[count], way[count], rest[count] = openings(
-                listed, kinds, component, axis, own, cells, cell, across_axis(opened, axis), shape,
-                wraps,
-            )  # fmt: skip
+            between = openings(listed, kinds, axis, opened, cells, cell, faces)
+            above[count], way[count], rest[count] = between
             count += 1
     shut, lent = closed.faces, np.zeros(closed.shares.shape)
     for turn in range(ROUNDS):
         for group in range(2):  # along its own axis, then all others together
             ways, gained = range(0, 1) if group == 0 else range(1, count), np.zeros(size)
             for m in ways:
-                even_out(
-                    held, aim, part, above[m], way[m], rest[m], 1.0 / len(ways), given[m], gained
-                )
+                between = Openings(above[m], way[m], rest[m])
+                even_out(held, aim, part, between, 1.0 / len(ways), given[m], gained)
             for n in range(size):
                 held[n] += gained[n]
                 flat[listed[n]] = held[n]
@@ -295,7 +290,7 @@ def share_out(
                 for n in range(shut.size):
                     for m in range(2):
                         lent[n, m] = closed.shares[n, m] * flat[shut[n]]
-                merge_small(volume, shut, closed.targets, closed.shares)
+                merge_small(volume, closed)
                 for n in range(size):
                     held[n] = flat[listed[n]]
     for n in range(shut.size):

@@ -6,6 +6,8 @@ layer thick along its first axis, which nothing moves along.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import prange
 
@@ -27,21 +29,70 @@ PLANES = 8
 """Planes that one thread goes through at a time: what leaves one comes into the next."""
 
 
+class Fluxes(NamedTuple):
+    """What flows through the sides of the control volumes of one component.
+
+    through    volume per time through the faces of the cells across each axis
+    component  axis of the kernel
+    place      (2, n + 1, 2) of which two faces' fluxes those through the sides are means: across
+               other axes, and across the component's own
+    share      (2, n + 1, 2) how much of each
+    """
+
+    through: Faces
+    component: int
+    place: Integers
+    share: Array
+
+
+class Stage(NamedTuple):
+    """A stage of a step: (before start - dt net) / after in each control volume.
+
+    later    the component after it; where the volume is not above `nothing`, what is left of the
+             amount in place of the value
+    net      net amount that leaves each control volume per time: given by a stage of weight 1,
+             taken with 1 - `weight` by one of less
+    volume   after it
+    weight   of what leaves in it
+    dt       s
+    nothing  volume up to which a control volume holds nothing
+    """
+
+    later: Array
+    net: Array
+    volume: Array
+    weight: float
+    dt: float
+    nothing: float
+
+
+class Padded(NamedTuple):
+    """The component that is carried along with its ghosts, and which values may be used: CUT, CLEAR
+    or UPSTREAM."""
+
+    values: Array
+    marks: Marks
+
+
+@inlined
+def in_line(now: Stage) -> Stage:
+    """The same with flat arrays."""
+    later, net, volume = now.later.reshape(-1), now.net.reshape(-1), now.volume.reshape(-1)
+    return Stage(later, net, volume, now.weight, now.dt, now.nothing)
+
+
 @inlined
 def line_flux(
     out: Array,
-    first: int,
-    end: int,
+    span: tuple[int, int],
     q: Array,
-    one: int,
-    other: int,
+    rows: tuple[int, int],
     share: Array,
     field: Array,
     marks: Marks,
-    at: int,
-    step: int,
+    across: tuple[int, int],
 ) -> None:
-    """Flux x value at a row of sides, from `first` to `end`, all arrays flat.
+    """Flux x value at a row of sides, from the first to the end of `span`, all arrays flat.
 
     What flows through each side is the mean of what flows through the faces of two cells. The
     upwind value of third order (Leonard 1979) lies between both neighbours, but for smooth extrema,
@@ -49,12 +100,12 @@ def line_flux(
     where one is UPSTREAM, else the mean of both. Written without branches and views, and with
     unsigned places, so that it vectorises.
 
-    one, other  where in q the rows of faces begin; share (2,) how much of each
-    at, step    where the row above the sides begins in the padded field, and what is between
-                neighbours across them
+    rows    where in q the two rows of faces begin; share (2,) how much of each
+    across  where the row above the sides begins in the padded field, and what is between neighbours
+            across them
     """
-    s, t = share[0], share[1]
-    for k in range(first, end):
+    (one, other), (at, step), s, t = rows, across, share[0], share[1]
+    for k in range(span[0], span[1]):
         g = s * q[one + k] + t * q[other + k]
         n = at + k
         low, high = field[n - step], field[n]
@@ -84,8 +135,7 @@ def side_row(
     share: Array,
     field: Array,
     marks: Marks,
-    at: int,
-    step: int,
+    across: tuple[int, int],
 ) -> None:
     """Flux x value through `count` sides of the control volumes (i, j, :) of a component.
 
@@ -95,56 +145,34 @@ def side_row(
     n1, n2, zero, one = np.uintp(shape[1]), np.uintp(shape[2]), np.uintp(0), np.uintp(1)
     if component == 0:
         low, high = np.uintp(place[i, 0]), np.uintp(place[i, 1])
-        low, high = (low * n1 + j) * n2, (high * n1 + j) * n2
-        line_flux(out, zero, count, q, low, high, share[i], field, marks, at, step)
+        rows = (low * n1 + j) * n2, (high * n1 + j) * n2
+        line_flux(out, (zero, count), q, rows, share[i], field, marks, across)
     elif component == 1:
         low, high = np.uintp(place[j, 0]), np.uintp(place[j, 1])
-        low, high = (i * n1 + low) * n2, (i * n1 + high) * n2
-        line_flux(out, zero, count, q, low, high, share[j], field, marks, at, step)
+        rows = (i * n1 + low) * n2, (i * n1 + high) * n2
+        line_flux(out, (zero, count), q, rows, share[j], field, marks, across)
     else:
         row = (i * n1 + j) * n2
-        line_flux(out, one, count - one, q, row - one, row, share[1], field, marks, at, step)
+        rows = row - one, row
+        line_flux(out, (one, count - one), q, rows, share[1], field, marks, across)
         for k in (zero, count - one):
-            low, high = row + np.uintp(place[k, 0]) - k, row + np.uintp(place[k, 1]) - k
-            line_flux(out, k, k + one, q, low, high, share[k], field, marks, at, step)
+            rows = row + np.uintp(place[k, 0]) - k, row + np.uintp(place[k, 1]) - k
+            line_flux(out, (k, k + one), q, rows, share[k], field, marks, across)
 
 
 @kernel
-def stage(
-    out: Array,
-    net: Array,
-    weight: float,
-    start: Array,
-    before: Array,
-    after: Array,
-    dt: float,
-    nothing: float,
-    field: Array,
-    marks: Marks,
-    q: Faces,
-    component: int,
-    place: Integers,
-    share: Array,
-) -> None:
-    """A component after a stage: (before start - dt net) / after in each of its control volumes.
+def stage(now: Stage, start: Array, before: Array, padded: Padded, flux: Fluxes) -> None:
+    """A component after a stage.
 
-    out            (n0, n1, n2); where the volume after is not above `nothing`, what is left of the
-                   amount is given in place of the value
-    net            net amount that leaves each control volume per time: given by a stage of weight
-                   1, taken with 1 - `weight` by one of less
-    start          the component at the start
-    before, after  volumes at both ends
-    field          the component that is carried along, padded
-    marks          padded: CUT, CLEAR or UPSTREAM
-    q              volume per time through the faces of the cells across each axis
-    place, share   (2, n + 1, 2) of which two faces' fluxes those through the sides are means, and
-                   how much of each: across other axes, and across the component's own
+    start, before  the component and the volumes at the start
     """
+    q, component, place, share = flux
     qx, qy, qz = q[0].reshape(-1), q[1].reshape(-1), q[2].reshape(-1)
+    out, weight, dt, nothing = now.later, now.weight, now.dt, now.nothing
     n0, n1, n2 = np.uintp(out.shape[0]), np.uintp(out.shape[1]), np.uintp(out.shape[2])
-    values, mark = field.reshape(-1), marks.reshape(-1)
-    later, leaving = out.reshape(-1), net.reshape(-1)
-    first, low, high = start.reshape(-1), before.reshape(-1), after.reshape(-1)
+    field, values, mark = padded.values, padded.values.reshape(-1), padded.marks.reshape(-1)
+    later, leaving, high = out.reshape(-1), now.net.reshape(-1), now.volume.reshape(-1)
+    first, low = start.reshape(-1), before.reshape(-1)
     zero, one, deep = np.uintp(0), np.uintp(1), np.uintp(GHOSTS)
     room = field.shape[0] > out.shape[0]
     p = deep if room else zero
@@ -162,8 +190,8 @@ def stage(
             for j in range(n1 + one):
                 at = ((i + p) * rows + j + deep) * wide + deep
                 side_row(
-                    row, n2, qy, q[1].shape, i, j, component, y_place, y_share, values, mark, at,
-                    wide,
+                    row, n2, qy, q[1].shape, i, j, component, y_place, y_share, values, mark,
+                    (at, wide),
                 )  # fmt: skip
                 if j > zero:
                     n = (i * n1 + j - one) * n2
@@ -183,7 +211,7 @@ def stage(
                     break
                 side_row(
                     side, n2 + one, qz, q[2].shape, i, j, component, z_place, z_share, values,
-                    mark, at, one,
+                    mark, (at, one),
                 )  # fmt: skip
                 for k in range(n2):
                     sums[k] = side[k + one] - side[k] - row[k]
@@ -193,13 +221,13 @@ def stage(
                 if i == bottom:
                     side_row(
                         row, n2, qx, q[0].shape, i, j, component, x_place, x_share, values, mark,
-                        at, rows * wide,
+                        (at, rows * wide),
                     )  # fmt: skip
                     for k in range(n2):
                         below[n + k] = row[k]
                 side_row(
                     row, n2, qx, q[0].shape, i + one, j, component, x_place, x_share, values, mark,
-                    at + rows * wide, rows * wide,
+                    (at + rows * wide, rows * wide),
                 )  # fmt: skip
                 for k in range(n2):
                     sums[k] += row[k] - below[n + k]

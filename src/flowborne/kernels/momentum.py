@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 
@@ -29,13 +31,22 @@ ROUNDING, OF_THE_WHOLE = 1e-14, 1e-15
 hand's forces are sums in which those of the whole creature cancel."""
 
 
+class Momenta(NamedTuple):
+    """Momenta about the world origin, N s, N m s.
+
+    given, later  (bodies, 6) of the subtree of each body, P and P+
+    body          (nv,) their rows for each dof
+    """
+
+    given: Array
+    later: Array
+    body: Integers
+
+
 @njit(nogil=True, cache=True)
 def momentum_impulse(
-    cdof: Array,
-    centre: Array,
-    given: Array,
-    later: Array,
-    body: Integers,
+    twist: Array,
+    momenta: Momenta,
     conserved: Mask,
     gained: Array,
     still: Array,
@@ -48,23 +59,17 @@ def momentum_impulse(
         r = A v + (M - armature) (v+ - v) + S.(P - P+) + dt f      along conserved dofs
         r = A v - dt c + dt f                                      along the others
 
-    cdof, centre                (nv, 6), (nv, 3) of the twists S about the world origin
-    given, later, body          (bodies, 6) P and P+, and (nv,) their rows for each dof
+    twist                       (nv, 6) S about the world origin, for unit velocity of each dof
     gained, still, bias, outer  (nv,) (M - armature) (v+ - v), A v, c, f
     """
-    dofs = len(cdof)
+    dofs, (given, later, body) = len(twist), momenta
     impulse, rounding, largest = np.empty(dofs), np.empty(dofs), 0.0
-    twist = np.empty(6)
     for n in range(dofs):
-        for i in range(3):
-            j, k = (i + 1) % 3, (i + 2) % 3
-            across = centre[n, j] * cdof[n, k] - centre[n, k] * cdof[n, j]
-            twist[i], twist[3 + i] = cdof[n, 3 + i] + across, cdof[n, i]
         change, scale = 0.0, 0.0
         for i in range(6):
             before, after = given[body[n], i], later[body[n], i]
-            change += twist[i] * (before - after)
-            scale += abs(twist[i]) * (abs(before) + abs(after))
+            change += twist[n, i] * (before - after)
+            scale += abs(twist[n, i]) * (abs(before) + abs(after))
         moved = change + gained[n] if conserved[n] else -dt * bias[n]
         impulse[n] = still[n] + moved + dt * outer[n]
         rounding[n] = ROUNDING * (scale + dt * abs(outer[n]))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit, prange
 
-from flowborne.kernels.arrays import Array, Integers
+from flowborne.kernels.arrays import Array, Integers, Nodes
 from flowborne.kernels.edge_crossings import Placed, distance_to
 from flowborne.kernels.jit import kernel
 
@@ -22,16 +22,10 @@ NEAR = 1.75
 
 @njit(nogil=True, cache=True)
 def node_box(
-    geoms: Integers,
-    position: Array,
-    rotation: Array,
-    reach: Array,
-    origin: Array,
-    h: float,
-    shape: Integers,
+    geoms: Integers, position: Array, rotation: Array, reach: Array, nodes: Nodes, shape: Integers
 ) -> Integers:
     """Node ranges (low, high per axis) around the given geometries, with the band; may be empty."""
-    box = np.empty((3, 2), np.int64)
+    box, (origin, h, _) = np.empty((3, 2), np.int64), nodes
     for axis in range(3):
         low, high = 1e300, -1e300
         for g in geoms:
@@ -48,10 +42,9 @@ def node_box(
 
 
 @njit(nogil=True, cache=True)
-def lower_to_body(
-    phi: Array, box: Integers, body: Placed, origin: Array, h: float, flat: bool
-) -> None:
-    """Lower the distance at the nodes of a box to that of a geometry; a slab's lie at z = 0."""
+def lower_to_body(phi: Array, box: Integers, body: Placed, nodes: Nodes) -> None:
+    """Lower the distance at the nodes of a box to that of a geometry."""
+    origin, h, flat = nodes
     for i in range(phi.shape[0]):
         x = origin[0] + h * (box[0, 0] + i)
         for j in range(phi.shape[1]):

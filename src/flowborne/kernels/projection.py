@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit, prange
 
-from flowborne.kernels.arrays import CLOSED, PERIODIC, Array, Faces, Integers
+from flowborne.kernels.arrays import Array, Faces, Integers
 from flowborne.kernels.control_volumes import across_axis, neighbour
 from flowborne.kernels.dye import face_of
 from flowborne.kernels.jit import kernel
@@ -29,13 +29,14 @@ def net_out(out: Array, qx: Array, qy: Array, qz: Array) -> None:
 
 @kernel
 def subtract_gradient(
-    velocity: Array, rate: Array, pressure: Array, axis: int, scale: float, codes: Integers
+    velocity: Array, rate: Array, pressure: Array, axis: int, scale: float, periodic: bool
 ) -> None:
     """Subtract scale rate (p_upper - p_lower) from the velocity of the faces across `axis`.
 
-    rate   a A / m
-    scale  dt for a pressure, 1 for p^. Faces that are wholly closed, and those on closed sides,
-           keep their velocity; beyond an open side the pressure is 0
+    rate      a A / m; faces of which it is 0, as on sides that prescribe the flux, keep their
+              velocity
+    scale     dt for a pressure, 1 for p^
+    periodic  whether the domain is along the axis; else the pressure beyond the sides is 0
     """
     n = pressure.shape[axis]
     di, dj, dk = int(axis == 0), int(axis == 1), int(axis == 2)
@@ -48,17 +49,13 @@ def subtract_gradient(
                 if 0 < at < n:
                     difference = pressure[i, j, k] - pressure[i - di, j - dj, k - dk]
                 elif at == 0:
-                    if codes[axis, 0] == CLOSED:
-                        continue
                     difference = pressure[i, j, k]
-                    if codes[axis, 0] == PERIODIC:
+                    if periodic:
                         far = pressure[i + di * (n - 1), j + dj * (n - 1), k + dk * (n - 1)]
                         difference = pressure[i, j, k] - far
                 else:
-                    if codes[axis, 1] == CLOSED:
-                        continue
                     difference = -pressure[i - di, j - dj, k - dk]
-                    if codes[axis, 1] == PERIODIC:
+                    if periodic:
                         difference = (
                             pressure[i - di * n, j - dj * n, k - dk * n]
                             - pressure[i - di, j - dj, k - dk]

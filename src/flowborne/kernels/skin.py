@@ -11,8 +11,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from flowborne.kernels.arrays import Array, Integers, Point
-from flowborne.kernels.edge_crossings import PIECES, Crossings, add_crossing
+from flowborne.kernels.arrays import Array, Integers, Nodes, Point
+from flowborne.kernels.edge_crossings import Crossings, add_crossing
 from flowborne.kernels.node_distance import BAND
 from flowborne.kernels.triangles import closest_on_triangle, squared_distance
 
@@ -32,9 +32,9 @@ def first_node(x: float, count: int) -> int:
 
 
 @njit(nogil=True, cache=True)
-def skin_box(vertices: Array, origin: Array, h: float, shape: Integers) -> Integers:
+def skin_box(vertices: Array, nodes: Nodes, shape: Integers) -> Integers:
     """Node ranges (low, high per axis) around all vertices (n, 3), with the band; may be empty."""
-    box = np.empty((3, 2), np.int64)
+    box, (origin, h, _) = np.empty((3, 2), np.int64), nodes
     for axis in range(3):
         low = (vertices[:, axis].min() - origin[axis]) / h
         high = (vertices[:, axis].max() - origin[axis]) / h
@@ -113,13 +113,7 @@ def lower_squares(
 
 @njit(nogil=True, cache=True)
 def sample_skin(
-    vertices: Array,
-    triangles: Integers,
-    box: Integers,
-    origin: Array,
-    h: float,
-    flat: bool,
-    band: float,
+    vertices: Array, triangles: Integers, box: Integers, nodes: Nodes, band: float
 ) -> Array:
     """(box shape) signed distance to a skin at the nodes of its box, m, negative inside.
 
@@ -129,11 +123,12 @@ def sample_skin(
     vertices   (n, 3) m
     triangles  (k, 3) vertices of each, counterclockwise from outside; together a closed surface
     box        (3, 2) node ranges, may cut the skin off
-    flat       a slab: its nodes lie at z = 0, and only triangles that reach there count for the
-               distance, so the ends of a prism may be at any height
+    nodes      of a slab: only triangles that reach z = 0 count for the distance, so the ends of a
+               prism may be at any height
     band       cells
     Where flesh overlaps itself the distance is the one to the nearest sheet, covered ones included.
     """
+    origin, h, flat = nodes
     shape = (box[0, 1] - box[0, 0], box[1, 1] - box[1, 0], box[2, 1] - box[2, 0])
     counts = (shape[0], shape[1], min(shape[2], 1) if flat else shape[2])
     places = (vertices - origin) / h - box[:, 0]
@@ -166,13 +161,14 @@ def sample_skin(
 @njit(nogil=True, cache=True)
 def cross_skin(
     found: Crossings, used: Integers, phi: Array, vertices: Array, triangles: Integers,
-    sheet: Integers, number: int, box: Integers, origin: Array, h: float, flat: bool,
+    piece: Integers, box: Integers, nodes: Nodes,
 ) -> None:  # fmt: skip
     """Note where edges cross a skin (see `edge_crossings`).
 
-    phi     distance to the body or flesh at the nodes of its box, m
-    sheet   (k,) smooth sheet of each triangle, of geometry `number`
+    phi    distance to the body or flesh at the nodes of its box, m
+    piece  (k,) smooth piece of each triangle
     """
+    origin, h, flat = nodes
     places = (vertices - origin) / h - box[:, 0]
     if flat:
         places[:, 2] = vertices[:, 2] / h
@@ -216,10 +212,9 @@ def cross_skin(
                         continue
                     part = x - node[d] if enters else node[d] + 1.0 - x
                     twice = not lower and not upper
-                    add_crossing(
-                        found, used, d, node[0], node[1], node[2], twice, twice and not enters,
-                        part, unit, number * PIECES + sheet[t],
-                    )  # fmt: skip
+                    edge = d, node[0], node[1], node[2]
+                    at_upper = twice and not enters
+                    add_crossing(found, used, edge, twice, at_upper, part, unit, piece[t])
 
 
 @njit(nogil=True, cache=True)

@@ -3,6 +3,8 @@ where parallel lines cross them, and the distance to sheets about them."""
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 
@@ -152,26 +154,9 @@ def squared(p: Point, q: Point) -> float:
     return (p[0] - q[0]) ** 2 + (p[1] - q[1]) ** 2 + (p[2] - q[2]) ** 2
 
 
-@njit(nogil=True, cache=True)
-def lower_to_sheets(
-    values: Array,
-    corner: Array,
-    pitch: float,
-    triangles: Array,
-    normal: Array,
-    outward: Array,
-    limit: Array,
-    number: Integers,
-    start: Integers,
-    rims: Integers,
-    half: float,
-    band: float,
-) -> None:
-    """Lower values on a lattice to the distances to sheets, m, negative inside.
+class Sheets(NamedTuple):
+    """Sheets that reach `half` m from a triangle each, and beyond an edge no farther than a limit.
 
-    A sheet is as far as `half` m from its triangle, and beyond an edge no farther than the limit.
-
-    values     (nx, ny, nz) m;  corner  (3,) place of the first, m;  pitch  between two, m
     triangles  (m, 3, 3) m
     normal     (m, 3) unit vectors
     outward    (m, 3, 3) unit vectors across the edges, away from the triangle, in its plane
@@ -179,8 +164,29 @@ def lower_to_sheets(
     number     (m, 3) of the triangles' corners among all vertices
     start      (vertices + 1,) where the edges of sheets begin in the list that end at a vertex
     rims       those edges: 3 triangle + edge
-    band       distances up to which values are lowered, m
+    half       m
     """
+
+    triangles: Array
+    normal: Array
+    outward: Array
+    limit: Array
+    number: Integers
+    start: Integers
+    rims: Integers
+    half: float
+
+
+@njit(nogil=True, cache=True)
+def lower_to_sheets(
+    values: Array, corner: Array, pitch: float, sheets: Sheets, band: float
+) -> None:
+    """Lower values on a lattice to the distances to sheets, m, negative inside.
+
+    values  (nx, ny, nz) m;  corner  (3,) place of the first, m;  pitch  between two, m
+    band    distances up to which values are lowered, m
+    """
+    triangles, normal, outward, limit, number, start, rims, half = sheets
     first, last = np.empty(3, np.int64), np.empty(3, np.int64)
     for t in range(len(triangles)):
         for d in range(3):

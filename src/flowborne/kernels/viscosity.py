@@ -7,10 +7,12 @@ the centre of the whole face along the two other axes, in cells.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit, prange
 
-from flowborne.kernels.arrays import CLOSED, PERIODIC, Array, Integers, Marks
+from flowborne.kernels.arrays import PERIODIC, PRESCRIBED, Array, Integers, Marks
 from flowborne.kernels.cut_faces import closed_face, open_edge, other_axes
 from flowborne.kernels.edge_crossings import Crossings
 from flowborne.kernels.jit import kernel
@@ -18,12 +20,37 @@ from flowborne.kernels.jit import kernel
 INACTIVE, UNKNOWN, GIVEN, TIED = range(4)
 """A face is inside a body, solved for, prescribed by a side, or moves with the body beside it."""
 
+Index = tuple[int, int, int]
+
 LEAST = 1e-3
 """Least distance from a wall and between two faces, and least open part of a cell over that of its
 faces: bounds friction where they are smaller."""
 
 SAME = 1e-12
 """Open parts of two faces that differ by less are the same."""
+
+
+class CutFaces(NamedTuple):
+    """The faces across one axis, and what bodies leave open around them.
+
+    axis       that
+    kind       INACTIVE, UNKNOWN, GIVEN or TIED
+    distance   to the bodies at the nodes, m
+    crossings  of edges with them
+    opened     open part of each face
+    centre     (2, ...) of that, see the module
+    parts      (nx, ny, nz) open part of each cell
+    stiffness  mu A / h, kg/s
+    """
+
+    axis: int
+    kind: Marks
+    distance: Array
+    crossings: Crossings
+    opened: Array
+    centre: Array
+    parts: Array
+    stiffness: float
 
 
 @kernel
@@ -43,8 +70,11 @@ def face_distances(distance: Array, axis: int, out: Array) -> None:
 
 
 @kernel
-def classify(kind: Marks, opened: Array, axis: int, codes: Integers, touching: float) -> None:
-    """Kind of every face across `axis` from its open part."""
+def classify(kind: Marks, opened: Array, axis: int, normal: Integers, touching: float) -> None:
+    """Kind of every face across `axis` from its open part.
+
+    normal  (3, 2) a of the velocity across the sides, see `fluid.sides.side`
+    """
     last = kind.shape[axis] - 1
     for i in prange(kind.shape[0]):
         for j in range(kind.shape[1]):
@@ -53,11 +83,11 @@ def classify(kind: Marks, opened: Array, axis: int, codes: Integers, touching: f
                 kind[i, j, k] = UNKNOWN
                 if opened[i, j, k] == 0.0:
                     kind[i, j, k] = INACTIVE
-                elif (at == 0 and codes[axis, 0] == CLOSED) or (
-                    at == last and codes[axis, 1] == CLOSED
+                elif (at == 0 and normal[axis, 0] == PRESCRIBED) or (
+                    at == last and normal[axis, 1] == PRESCRIBED
                 ):
                     kind[i, j, k] = GIVEN
-                elif at == last and codes[axis, 1] == PERIODIC:
+                elif at == last and normal[axis, 1] == PERIODIC:
                     kind[i, j, k] = INACTIVE
                 elif opened[i, j, k] <= touching:
                     kind[i, j, k] = TIED
@@ -95,14 +125,11 @@ def along(one: float, other: float, part: float) -> float:
 
 @njit(nogil=True, cache=True)
 def across(
-    distance: Array, crossings: Crossings, centre: Array, axis: int, d: int, i: int, j: int, k: int,
-    g: tuple[int, int, int],
-) -> float:  # fmt: skip
-    """Link between a face across `axis` and the next one along d, over that of open ones: the open
-    part of the edge between them over the distance of the centres of their open parts.
-
-    g  the next face
-    """
+    distance: Array, crossings: Crossings, centre: Array, axis: int, d: int, f: Index, g: Index
+) -> float:
+    """Link between face f across `axis` and the next one g along d, over that of open ones: the
+    open part of the edge between them over the distance of the centres of their open parts."""
+    i, j, k = f
     n = int(d == other_axes(axis)[1])
     part = edge_beside(
         distance, crossings, axis, d, i + int(d == 0), j + int(d == 1), k + int(d == 2)
@@ -141,31 +168,21 @@ def nearest_node(distance: Array, i: int, j: int, k: int, ni: int, nj: int, nk: 
 
 @kernel
 def link_faces(
-    axis: int,
+    faces: CutFaces,
     d: int,
-    kind: Marks,
     away: Array,
-    distance: Array,
-    crossings: Crossings,
-    opened: Array,
-    centre: Array,
-    parts: Array,
     velocity: Array,
-    stiffness: float,
     diagonal: Array,
     link: Array,
     given: Array,
     periodic: bool,
 ) -> None:
-    """Add the links along d to the system of the faces across `axis`.
+    """Add the links along d to the system of faces.
 
-    away       distance to bodies at each face; above 0 where it and its neighbours are uncut
-    distance   to the bodies at the nodes;  crossings  of edges with them
-    opened     open part of each face
-    parts      of each cell
-    stiffness  mu A / h, kg/s
-    periodic   whether the domain is along d
+    away      distance to bodies at each face; above 0 where it and its neighbours are uncut
+    periodic  whether the domain is along d
     """
+    axis, kind, distance, crossings, opened, centre, parts, stiffness = faces
     count = kind.shape[d] - int(periodic and d == axis)
     for i in range(kind.shape[0]):
         for j in range(kind.shape[1]):
@@ -184,9 +201,8 @@ def link_faces(
                 elif d == axis:
                     coefficient = stiffness * along(opened[i, j, k], opened[g], parts[i, j, k])
                 else:
-                    coefficient = stiffness * across(
-                        distance, crossings, centre, axis, d, i, j, k, g
-                    )
+                    between = across(distance, crossings, centre, axis, d, (i, j, k), g)
+                    coefficient = stiffness * between
                 if here:
                     diagonal[i, j, k] += coefficient
                 if there:
@@ -201,33 +217,23 @@ def link_faces(
 
 @kernel
 def meet_walls(
-    axis: int,
-    kind: Marks,
-    distance: Array,
-    crossings: Crossings,
-    opened: Array,
-    centre: Array,
-    parts: Array,
-    stiffness: float,
-    codes: Integers,
-    beside: Integers,
-    wall: Array,
-    gap: Array,
-    place: Array,
-    node: Integers,
-) -> None:
-    """What walls do to the faces `beside` (n,), flat indices of unknown ones across `axis`.
+    faces: CutFaces, normal: Integers, beside: Integers
+) -> tuple[Array, Array, Array, Integers]:
+    """What walls do to the faces `beside` (n,), flat indices of unknown ones.
 
     Three walls each: in the plane of the face, in the cell below it and in that above it.
 
-    wall   (n, 3) W, kg/s; 0 where there is none
-    gap    (n, 3, 3) from the wall point to the centre of the face's open part, cells
-    place  (n, 3, 3) from the centre of the face to the wall point, cells
-    node   (n, 3) flat index of the node nearest to a body
+    normal   (3, 2) a of the velocity across the sides, see `fluid.sides.side`
+    returns  (n, 3) W, kg/s, 0 where there is none; (n, 3, 3) from the wall point to the centre of
+             the face's open part, cells; (n, 3, 3) from the centre of the face to the wall point,
+             cells; (n, 3) flat index of the node nearest to a body
     """
+    axis, kind, distance, crossings, opened, centre, parts, stiffness = faces
+    wall, node = np.zeros((beside.size, 3)), np.zeros((beside.size, 3), np.int64)
+    gap, place = np.zeros((beside.size, 3, 3)), np.zeros((beside.size, 3, 3))
     flat = parts.shape[2] == 1
     others = other_axes(axis)
-    count = kind.shape[axis] - int(codes[axis, 0] == PERIODIC)
+    count = kind.shape[axis] - int(normal[axis, 0] == PERIODIC)
     step = (int(axis == 0), int(axis == 1), int(axis == 2))
     total, pull = np.zeros(2), np.zeros(2)
     for n in range(beside.size):
@@ -240,7 +246,7 @@ def meet_walls(
         total[:], pull[:] = 0.0, 0.0
         for m in range(1 if flat else 2):
             d = others[m]
-            periodic = codes[d, 0] == PERIODIC
+            periodic = normal[d, 0] == PERIODIC
             at = i if d == 0 else (j if d == 1 else k)
             for side in (-1, 1):
                 upper = int(side > 0)
@@ -281,7 +287,7 @@ def meet_walls(
         at = i if axis == 0 else (j if axis == 1 else k)
         for side in (-1, 1):
             to, entry = at + side, 1 + int(side > 0)
-            if codes[axis, 0] == PERIODIC:
+            if normal[axis, 0] == PERIODIC:
                 to = (to + count) % count
             elif to < 0 or to >= count:
                 continue
@@ -302,6 +308,7 @@ def meet_walls(
                 where = min(max((mine - yours) / (own - other), -0.5), 0.5)
                 place[n, entry, others[m]] = where
                 gap[n, entry, others[m]] = centre[m, i, j, k] - where
+    return wall, gap, place, node
 
 
 @kernel

@@ -15,6 +15,7 @@ from flowborne.coupling.world import Fluid
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.grid import Array, Grid
 from flowborne.fluid.window import crosses
+from flowborne.kernels.arrays import FREE
 from flowborne.motion.inflow import Bands, DyeBandsValue
 from flowborne.scenes.domain import Domain, check_memory
 from flowborne.scenes.draft import Draft, Key
@@ -127,7 +128,7 @@ def check_fluid(draft: Draft) -> Iterator[str]:
     yield from _check_window(draft, scene.domain)
     if scene.boundaries is not None and draft.sound("boundaries"):
         yield from check_sides(draft, scene.boundaries, slab=scene.is_slab)
-        free = any(side.boundary.free for _, side in scene.boundaries)
+        free = any(side.boundary.normal == FREE for _, side in scene.boundaries)
         if scene.mouths and scene.is_two_way and not free:
             yield (
                 f"{draft.at('boundaries')}: what a mouth expels has nowhere to go, as no side is "

@@ -24,6 +24,7 @@ from flowborne.fluid.sides.kinds import (
     BoundaryPeriodic,
 )
 from flowborne.fluid.sides.side import Boundary
+from flowborne.kernels.arrays import FREE, PERIODIC
 from flowborne.motion.inflow import InflowProfile
 from flowborne.scenes.domain import Domain
 from flowborne.scenes.factors import RampTable
@@ -173,14 +174,14 @@ class BoundariesTable(Table):
 
     def periodic(self, axis: int) -> bool:
         """Whether bodies may cross the sides across an axis."""
-        return bool(getattr(self, f"{'xyz'[axis]}_min").boundary.joined)
+        return bool(getattr(self, f"{'xyz'[axis]}_min").boundary.normal == PERIODIC)
 
 
 def check_sides(places: Places, boundaries: BoundariesTable, *, slab: bool) -> Iterator[str]:
     sides = dict(boundaries)
     for axis, name in enumerate("xyz"):
         low, high = sides[f"{name}_min"], sides[f"{name}_max"]
-        if low.boundary.joined != high.boundary.joined:
+        if (low.boundary.normal == PERIODIC) != (high.boundary.normal == PERIODIC):
             yield (
                 f"{places.at('boundaries')}: {name}_min is {low.kind} and {name}_max is "
                 f"{high.kind}. Make both of them periodic or neither."
@@ -237,8 +238,9 @@ def check_outlet(
     rates  volume rates of the sources, m^3/s
     """
     kinds = {name: side.boundary for name, side in boundaries}
-    unclear = any(kinds[f"{a}_min"].joined != kinds[f"{a}_max"].joined for a in "xyz")
-    if unclear or any(kind.free for kind in kinds.values()):
+    ends = [(kinds[f"{a}_min"].normal, kinds[f"{a}_max"].normal) for a in "xyz"]
+    unclear = any((low == PERIODIC) != (high == PERIODIC) for low, high in ends)
+    if unclear or any(FREE in pair for pair in ends):
         return
     total, largest = 0.0, 0.0
     for name, side in boundaries:

@@ -6,11 +6,12 @@ from functools import cached_property
 
 import numpy as np
 
+from flowborne.kernels.arrays import Nodes
 from flowborne.kernels.distance import MESH
 from flowborne.kernels.node_distance import BAND
 from flowborne.kernels.skin import sample_skin
 from flowborne.kernels.thickness import way_inward
-from flowborne.kernels.triangles import crossings, distances_to_mesh, lower_to_sheets
+from flowborne.kernels.triangles import Sheets, crossings, distances_to_mesh, lower_to_sheets
 from flowborne.shapes.section import Section, cross
 from flowborne.shapes.shape import (
     DIRECTIONS,
@@ -93,7 +94,8 @@ class ShapeMesh(Shape):
         """Spaced as the nodes of the grid; near the surface they are not used."""
         corner, counts = lattice(self.reach, spacing, BAND * spacing)
         box = np.stack([np.zeros_like(counts), counts], axis=1)
-        found = sample_skin(self.vertices, self.faces, box, corner, spacing, False, BAND)
+        nodes = Nodes(corner, spacing, flat=False)
+        found = sample_skin(self.vertices, self.faces, box, nodes, BAND)
         return Samples(corner, spacing, found)
 
     def skin(self) -> Mesh | None:
@@ -208,15 +210,15 @@ class ShapeThickened(ShapeMesh):
         pitch = spacing / SHEET_SAMPLES_PER_CELL
         corner, counts = lattice(self.reach, pitch, BAND * spacing)
         values = np.full(counts, BAND * spacing)
-        lower_to_sheets(values, corner, pitch, *self._sheets(), self.half, SHEET_BAND * spacing)
+        lower_to_sheets(values, corner, pitch, self._sheets(), SHEET_BAND * spacing)
         return Samples(corner, pitch, values)
 
     def tips(self, width: float) -> float:
         """As for the mesh, where a ball fits into the sheets."""
         return thin_parts(self.vertices, self.faces, width, self._thin)
 
-    def _sheets(self) -> tuple[Array, Array, Array, Array, Integers, Integers, Integers]:
-        """The triangles in the middle of thin parts, as `lower_to_sheets` takes them."""
+    def _sheets(self) -> Sheets:
+        """About the triangles in the middle of thin parts."""
         corners = self.vertices[self.faces[self._thin]]
         normals = unit(outward(self.vertices[self.faces]))
         normal = normals[self._thin]
@@ -233,7 +235,8 @@ class ShapeThickened(ShapeMesh):
         ends_at = ends_at.reshape(2, -1)[:, limited].ravel()
         order = np.argsort(ends_at, kind="stable")
         start = np.searchsorted(ends_at[order], np.arange(len(self.vertices) + 1))
-        return middle, normal, across, limit, number, start, np.tile(limited, 2)[order]
+        rims = np.tile(limited, 2)[order]
+        return Sheets(middle, normal, across, limit, number, start, rims, self.half)
 
 
 def neighbours(faces: Integers) -> Integers:

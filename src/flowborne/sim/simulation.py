@@ -19,7 +19,7 @@ from flowborne.coupling.report import BREAKDOWNS, Outcome, StepReport
 from flowborne.coupling.stream import FlowState, flow_at
 from flowborne.coupling.world import Setup, World
 from flowborne.fluid.boundary import SIDES
-from flowborne.kernels.arrays import Array, Integers, Mask
+from flowborne.kernels.arrays import PRESCRIBED, Array, Integers, Mask
 from flowborne.kernels.jit import cores, kernel_threads
 from flowborne.runs.summary import BUDGET_OPEN
 from flowborne.scenes.changes import ChangeTable, values_at
@@ -428,7 +428,7 @@ def departed(world: World, report: StepReport) -> str | None:
         gone = low[:, axis] < grid.origin[axis], high[:, axis] > grid.upper[axis]
         for end, side in enumerate(fluid.boundaries.pair(axis)):
             found = np.flatnonzero(met & gone[end])
-            if found.size and side.prescribes:
+            if found.size and side.normal == PRESCRIBED:
                 return (
                     f"body '{model.body_names[body[found[0]]]}' has left the domain through its "
                     f"{side.kind} side {SIDES[2 * axis + end]}; enlarge [domain], or put a plane "

@@ -7,9 +7,9 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from flowborne.kernels.arrays import Array
-from flowborne.kernels.momentum import about_origin, momentum_impulse
+from flowborne.kernels.momentum import Momenta, about_origin, momentum_impulse
 from flowborne.solids.model import SolidModel, SolidState
-from flowborne.solids.scratch import Scratch, posed, scratch
+from flowborne.solids.scratch import Scratch, posed, scratch, twists_about_origin
 
 MOST_MOMENTA = 4
 """Half-way momenta of a model that a thread caches."""
@@ -126,7 +126,7 @@ class Halfway:
         """
         self._model, self._state, self._dt = model, state.copy(), dt
         self._still, self._mass, self._outer = still, mass, outer
-        self._cdof, self._centre = s.cdof.copy(), s.dof_centre()
+        self._twist = twists_about_origin(s.cdof, s.dof_centre())
         fall = dt * weight(model, s)
         self._given = subtree_halfway_momentum(model, s, before, dt) + fall
         self._last: tuple[bytes, tuple[Array, Array]] | None = None
@@ -148,11 +148,8 @@ class Halfway:
         mujoco.mj_rne(s.mj, s.data, 0, bias)
         gained = self._mass @ (v_plus - v) - model.armature * (v_plus - v)
         return momentum_impulse(
-            self._cdof,
-            self._centre,
-            self._given,
-            later,
-            model.dof_body,
+            self._twist,
+            Momenta(self._given, later, model.dof_body),
             model.conserved,
             gained,
             self._still,

@@ -36,7 +36,7 @@ from flowborne.kernels.arrays import (
     Real,
     Rows,
 )
-from flowborne.kernels.conjugate_gradients import solve
+from flowborne.kernels.conjugate_gradients import Matrix, Preconditioner, solve
 from flowborne.kernels.levels import at_level
 from flowborne.kernels.regions import NULL, region_loads
 from flowborne.kernels.sparse_rows import add_rows, padded_rows, row_gram, row_gram_along, sum_rows
@@ -75,22 +75,6 @@ NO_TERM = LowRankTerm(
 """K alone."""
 
 NO_DENSE_TERM: DenseTerm = np.zeros(0, np.int64), np.zeros((0, 0)), np.zeros(0)
-
-
-@dataclass(frozen=True)
-class Deflation:
-    """What a term adds to the system of one geometry, the same for every right-hand side.
-
-    rows     of J in active cells, with padded flat indices
-    null     see `null_basis`
-    fields   (m, padded shape) and
-    amounts  (m, k) of the modes in the preconditioner, see `mode_fields`
-    """
-
-    rows: Rows
-    null: Array
-    fields: Real
-    amounts: Array
 
 
 @dataclass(frozen=True)
@@ -152,7 +136,7 @@ class PressureSystem:
         if self.slab:
             faces = (np.zeros((1, 1, 1)), x.reshape(1, nx + 1, ny), y.reshape(1, nx, ny + 1))
         self.beyond = padded_cells(beyond[0], inner), *beyond[1:]
-        self._deflation: tuple[LowRankTerm, Deflation] | None = None
+        self._prepared: tuple[LowRankTerm, Matrix, Preconditioner] | None = None
         self.buffers = borrow(inner, wraps, self)
         self.regions, self.scale, self.finest = self.buffers.prepare(faces, reaction)
 
@@ -180,22 +164,10 @@ class PressureSystem:
         else:
             load_cells(x, np.ascontiguousarray(guess, np.float64).reshape(cells), diagonal)
         load_cells(right, np.ascontiguousarray(rhs, np.float64).reshape(cells), diagonal)
-        added = self.deflation(term)
-        iterations, residual, converged = solve(
-            b.hierarchy,
-            b.cycle,
-            self.finest,
-            b.vectors,
-            added.rows,
-            term.mobility.arrays,
-            self.beyond,
-            b.label,
-            added.null,
-            added.fields,
-            added.amounts,
-            tolerance,
-            absolute,
-        )
+        if self._prepared is None or self._prepared[0] is not term:
+            self._prepared = term, *self._with_term(term)
+        matrix, cycle = self._prepared[1:]
+        iterations, residual, converged = solve(matrix, cycle, b.vectors, tolerance, absolute)
         start = (1 if inner[0] > 1 else 0, 1, 1)
         inside = tuple(slice(s, s + n) for s, n in zip(start, cells, strict=True))
         pressure = x[inside].copy().reshape(self.shape)
@@ -207,13 +179,8 @@ class PressureSystem:
         inner = label[(slice(None) if self.slab else slice(1, -1), slice(1, -1), slice(1, -1))]
         return inner.reshape(self.shape)
 
-    def deflation(self, term: LowRankTerm) -> Deflation:
-        """What the term adds; made when it is another than that of the last solve."""
-        if self._deflation is None or self._deflation[0] is not term:
-            self._deflation = term, self._deflate(term)
-        return self._deflation[1]
-
-    def _deflate(self, term: LowRankTerm) -> Deflation:
+    def _with_term(self, term: LowRankTerm) -> tuple[Matrix, Preconditioner]:
+        """The matrix with the term, the same for every right-hand side, and what deflates it."""
         b, mobility = self.buffers, term.mobility
         diagonal = b.finest[3]
         rows = padded_rows(term.rows, diagonal)
@@ -226,7 +193,8 @@ class PressureSystem:
         modes = compliant_modes(mobility, rows, inverse, self.scale, max(self.shape), held)
         if modes.size:
             fields, amounts = mode_fields(b.hierarchy, b.cycle, rows, modes)
-        return Deflation(rows, null, fields, amounts)
+        matrix = Matrix(self.finest, rows, mobility.arrays, self.beyond, b.label, null)
+        return matrix, Preconditioner(b.hierarchy, b.cycle, fields, amounts)
 
 
 def padded_cells(cells: Integers, shape: tuple[int, int, int]) -> Integers:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flowborne.kernels.arrays import CLOSED, PERIODIC, Array, Integers
+from flowborne.kernels.arrays import PERIODIC, PRESCRIBED, Array, Integers
 from flowborne.kernels.closed_fractions import CREASE
 
 
@@ -53,19 +53,19 @@ def share_closed_reference(
     beside: Integers,
     box: Integers,
     axis: int,
-    codes: Integers,
+    sides: Integers,
 ) -> tuple[Array, Array]:
     """`share_closed` in NumPy: the shares in the box, and the open fractions after it."""
     at, n = faces_in(box, axis), np.arange(box[axis, 0], box[axis, 1])
     union = np.where(own == total[at], own, face_closed_reference(distance, axis)[at])
     ends = [(int(d == axis),) * 2 for d in range(3)]
-    most = np.pad(beside, ends, mode="wrap" if codes[0] == PERIODIC else "constant")
+    most = np.pad(beside, ends, mode="wrap" if sides[0] == PERIODIC else "constant")
     crease = np.maximum(np.delete(most, 0, axis), np.delete(most, -1, axis))[at] > 1
     union = np.where((union > 1.0 - 1e-9) | ((union > 1.0 - CREASE) & crease), 1.0, union)
     touched, out = total[at] > 0.0, opened.copy()
     out[at] = np.where(touched, 1.0 - union, opened[at])
-    solid = ((n == 0) & (codes[0] == CLOSED)) | (
-        (n == opened.shape[axis] - 1) & (codes[1] == CLOSED)
+    solid = ((n == 0) & (sides[0] == PRESCRIBED)) | (
+        (n == opened.shape[axis] - 1) & (sides[1] == PRESCRIBED)
     )
     counts = touched & ~np.expand_dims(solid, tuple(d for d in range(3) if d != axis))
     part = union * own
@@ -75,7 +75,7 @@ def share_closed_reference(
 def list_closed_reference(
     share: Array, centre: Array, box: Integers, counts: Integers
 ) -> tuple[Integers, Array, Array]:
-    """`list_closed` in NumPy: flat indices of the faces, their closed parts, and the centres."""
+    """Flat indices of the faces, their closed parts, and the centres, in NumPy."""
     there = share > 0.0
     places = np.stack(np.nonzero(there)) + box[:, :1]
     return np.ravel_multi_index(tuple(places), tuple(counts)), share[there], centre[:, there].T

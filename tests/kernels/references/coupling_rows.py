@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.kernels.arrays import Array, Faces, Integers, Rows
+from flowborne.kernels.arrays import PRESCRIBED, Array, Faces, Integers, Rows
+from flowborne.kernels.closed_fractions import Piece
 from flowborne.kernels.coupling_rows import COVERED, ENCLOSED, NARROW, WIDE, Kinds
 
 
-def kinds_of_cells_reference(opened: Faces, walls: Integers) -> Kinds:
+def kinds_of_cells_reference(opened: Faces, normal: Integers) -> Kinds:
     """`kinds_of_cells` in NumPy."""
     slab = opened[0].shape[2] == 1
     shape = opened[1].shape[0], *opened[0].shape[1:]
@@ -17,7 +18,7 @@ def kinds_of_cells_reference(opened: Faces, walls: Integers) -> Kinds:
     for axis in range(2 if slab else 3):
         passes, layers = np.moveaxis(opened[axis].copy(), axis, 0), np.moveaxis(kind, axis, 0)
         for end in (0, -1):
-            if walls[axis, end]:
+            if normal[axis, end] == PRESCRIBED:
                 passes[end], layers[end] = 0.0, ENCLOSED
         wider = np.moveaxis(np.maximum(passes[:-1], passes[1:]), 0, axis)
         widest = np.maximum(widest, wider)
@@ -26,19 +27,11 @@ def kinds_of_cells_reference(opened: Faces, walls: Integers) -> Kinds:
     return kind
 
 
-def list_cells_reference(
-    share: Faces,
-    centre: Faces,
-    listed: NDArray[np.bool_],
-    box: Integers,
-    body: int,
-    origin: Array,
-    h: float,
-    area: float,
-    flat: bool,
-) -> tuple[Integers, Integers, Array]:
-    """`list_cells` in NumPy: cells (m,), columns (6m,) and values (6m,)."""
+def list_cells_reference(piece: Piece, listed: NDArray[np.bool_]) -> tuple[Integers, Array]:
+    """`list_cells` in NumPy: cells (n,) and values (n, 6)."""
+    box, (origin, h, flat), share, centre = piece.box, piece.nodes, piece.share, piece.centre
     inside = tuple(slice(low, high - 1) for low, high in box)
+    area = h if flat else h**2
     cell = np.moveaxis(np.indices(listed.shape)[(slice(None), *inside)], 0, -1)
     wrench = np.zeros((*cell.shape[:3], 6))
     for axis in range(2 if flat else 3):
@@ -57,7 +50,7 @@ def list_cells_reference(
     place = np.stack(np.nonzero(found), axis=1) + box[:, 0]
     values = wrench[found]
     cells = np.ravel_multi_index(tuple(place.T), listed.shape)
-    return cells, np.tile(6 * body + np.arange(6), cells.size), values.ravel()
+    return cells, values
 
 
 def flesh_rows_reference(

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from flowborne.kernels.arrays import Array, Faces, Integers, Marks
-from flowborne.kernels.flux import CLEAR, GHOSTS, ROOM, UPSTREAM
+from flowborne.kernels.arrays import Array, Faces, Marks
+from flowborne.kernels.flux import CLEAR, GHOSTS, ROOM, UPSTREAM, Fluxes, Padded, Stage
 
 
 def line_flux_reference(
@@ -22,13 +22,13 @@ def line_flux_reference(
     return np.asarray(flux * np.where((one == CLEAR) & (other == CLEAR), smooth, either))
 
 
-def side_fluxes_reference(flux: Faces, component: int, place: Integers, share: Array) -> Faces:
+def side_fluxes_reference(flux: Fluxes) -> Faces:
     """Volume per time through all sides of the control volumes across each axis."""
-    through = []
-    for axis, q in enumerate(flux):
+    through, component = [], flux.component
+    for axis, q in enumerate(flux.through):
         own = int(axis == component)
         count = q.shape[component] + 1
-        at, part = place[own, :count], share[own, :count]
+        at, part = flux.place[own, :count], flux.share[own, :count]
         q = np.moveaxis(q, component, -1)
         mean = part[:, 0] * q[..., at[:, 0]] + part[:, 1] * q[..., at[:, 1]]
         through.append(np.ascontiguousarray(np.moveaxis(mean, -1, component)))
@@ -58,27 +58,14 @@ def net_flux_reference(field: Array, marks: Marks, gx: Array, gy: Array, gz: Arr
 
 
 def stage_reference(
-    net: Array,
-    weight: float,
-    start: Array,
-    before: Array,
-    after: Array,
-    dt: float,
-    nothing: float,
-    field: Array,
-    marks: Marks,
-    q: Faces,
-    component: int,
-    place: Integers,
-    share: Array,
+    now: Stage, start: Array, before: Array, padded: Padded, flux: Fluxes
 ) -> tuple[Array, Array]:
     """`stage` in NumPy: the component after it, and the net amount that left it."""
-    through = side_fluxes_reference(q, component, place, share)
-    leaving = weight * net_flux_reference(field, marks, *through)
-    if weight < 1.0:
-        leaving += (1.0 - weight) * net
-    amount = before * start - dt * leaving
-    return amount / np.where(after > nothing, after, 1.0), leaving
+    leaving = now.weight * net_flux_reference(*padded, *side_fluxes_reference(flux))
+    if now.weight < 1.0:
+        leaving += (1.0 - now.weight) * now.net
+    amount = before * start - now.dt * leaving
+    return amount / np.where(now.volume > now.nothing, now.volume, 1.0), leaving
 
 
 def largest_crossing_reference(q: Faces) -> float:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flowborne.kernels.arrays import Array
-from flowborne.kernels.momentum import OF_THE_WHOLE, ROUNDING
+from flowborne.kernels.momentum import OF_THE_WHOLE, ROUNDING, Momenta
 
 
 def about_origin_reference(vector: Array, moment: Array, centre: Array) -> Array:
@@ -15,11 +15,8 @@ def about_origin_reference(vector: Array, moment: Array, centre: Array) -> Array
 
 
 def momentum_impulse_reference(
-    cdof: Array,
-    centre: Array,
-    given: Array,
-    later: Array,
-    body: NDArray[np.int64],
+    twist: Array,
+    momenta: Momenta,
     conserved: NDArray[np.bool_],
     gained: Array,
     still: Array,
@@ -28,10 +25,9 @@ def momentum_impulse_reference(
     dt: float,
 ) -> tuple[Array, Array]:
     """`momentum_impulse` in NumPy."""
-    turn, speed = cdof[:, :3], cdof[:, 3:]
-    S = np.concatenate([speed + np.cross(centre, turn), turn], axis=1)
-    change = gained + (S * (given - later)[body]).sum(axis=1)
+    given, later, body = momenta
+    change = gained + (twist * (given - later)[body]).sum(axis=1)
     impulse = still + np.where(conserved, change, -dt * bias) + dt * outer
-    scale = (np.abs(S) * (np.abs(given) + np.abs(later))[body]).sum(axis=1)
+    scale = (np.abs(twist) * (np.abs(given) + np.abs(later))[body]).sum(axis=1)
     room = ROUNDING * (scale + dt * np.abs(outer)) + OF_THE_WHOLE * scale.max(initial=0.0)
     return impulse, room

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from flowborne.kernels.arrays import CLOSED, PERIODIC, Array, Integers
+from flowborne.kernels.arrays import PERIODIC, PRESCRIBED, Array, Integers
 from flowborne.kernels.viscosity import GIVEN, INACTIVE, LEAST, SAME, TIED, UNKNOWN
 
 from .cut_faces import closed_polygon_reference, open_edge_reference
@@ -22,16 +22,16 @@ def face_distances_reference(distance: Array, axis: int) -> Array:
 
 
 def classify_reference(
-    opened: Array, axis: int, codes: Integers, touching: float
+    opened: Array, axis: int, normal: Integers, touching: float
 ) -> NDArray[np.uint8]:
     """`classify` in NumPy: the kinds."""
     kind = np.where(opened <= touching, TIED, UNKNOWN).astype(np.uint8)
     ends = np.moveaxis(kind, axis, 0)
-    if codes[axis, 0] == CLOSED:
+    if normal[axis, 0] == PRESCRIBED:
         ends[0] = GIVEN
-    if codes[axis, 1] == CLOSED:
+    if normal[axis, 1] == PRESCRIBED:
         ends[-1] = GIVEN
-    if codes[axis, 1] == PERIODIC:
+    if normal[axis, 1] == PERIODIC:
         ends[-1] = INACTIVE
     kind[opened == 0.0] = INACTIVE
     return kind
@@ -122,7 +122,7 @@ def meet_walls_reference(
     centre: Array,
     parts: Array,
     stiffness: float,
-    codes: Integers,
+    normal: Integers,
     beside: Integers,
 ) -> tuple[Array, Array, Array, Integers]:
     """`meet_walls` in NumPy: W, gap, place and node."""
@@ -137,7 +137,7 @@ def meet_walls_reference(
         e = 3 - axis - d
         ends = np.moveaxis(distance, (d, e), (0, 1))
         edges = open_edge_reference(ends[:, :-1], ends[:, 1:])
-        periodic = bool(codes[d, 0] == PERIODIC)
+        periodic = bool(normal[d, 0] == PERIODIC)
         for side, part in ((-1, edges[:-1]), (1, edges[1:])):
             part = np.moveaxis(part, (0, 1), (d, e))
             away = np.maximum(0.5 - side * centre[m], LEAST)
@@ -156,8 +156,8 @@ def meet_walls_reference(
     gap[0] = np.divide(pull, wall[0], np.zeros_like(pull), where=wall[0] > 0.0)
     for m, d in enumerate(others):
         place[0, d] = np.where(wall[0] > 0.0, centre[m], 0.0) - gap[0, d]
-    faces = kind.shape[axis] - int(codes[axis, 0] == PERIODIC)
-    periodic = bool(codes[axis, 0] == PERIODIC)
+    faces = kind.shape[axis] - int(normal[axis, 0] == PERIODIC)
+    periodic = bool(normal[axis, 0] == PERIODIC)
     distinct = [np.take(values, range(faces), axis) for values in (active, opened, *centre)]
     cells = np.moveaxis(parts, axis, 0)
     for entry, side in ((1, -1), (2, 1)):

@@ -25,6 +25,7 @@ import numpy as np
 from flowborne.fluid.grid import Array, Grid
 from flowborne.fluid.sides.kinds import BoundaryOpen
 from flowborne.fluid.sides.side import Boundary, Pair, Place
+from flowborne.kernels.arrays import FREE, PRESCRIBED
 
 Centre = tuple[float | None, float | None, float | None]
 """Along each axis the part of the way from the lower to the upper side; None along one on which the
@@ -144,7 +145,7 @@ def in_channel(centre: Centre) -> bool:
 
 
 def _between(low: type[Boundary] | Boundary, high: type[Boundary] | Boundary) -> float | None:
-    ends = low.free + low.endless, high.free + high.endless
+    ends = (low.normal == FREE) + low.endless, (high.normal == FREE) + high.endless
     if ends == (0, 0):
         return None
     return 0.5 if ends[0] == ends[1] else float(ends[0] > ends[1])
@@ -202,7 +203,7 @@ def sea_of(sides: Sequence[tuple[Place, Boundary]]) -> Sea | None:
     if not in_sea(kinds):
         return None
     leaves = [place for place, side in far if side.is_exit(place)]
-    mirrors = tuple(place for place, side in sides if side.mirrors)
+    mirrors = tuple(place for place, side in sides if is_mirror(side))
     return Sea(first, tuple(p for p, _ in far), mirrors, leaves[0] if leaves else None)
 
 
@@ -210,10 +211,15 @@ Kinds = Sequence[tuple[int, Boundary | type[Boundary]]]
 """The sides of a domain, or their kinds, each with the axis that it is across."""
 
 
+def is_mirror(side: Boundary | type[Boundary]) -> bool:
+    """Whether the flow beyond a side would be the mirror image of that inside."""
+    return side.normal == PRESCRIBED and side.tangential == FREE
+
+
 def in_sea(sides: Kinds) -> bool:
     """Whether all sides are far, or mirrors opposite far ones."""
     far = {axis for axis, side in sides if side.endless}
-    return all(side.endless or (side.mirrors and axis in far) for axis, side in sides)
+    return all(side.endless or (is_mirror(side) and axis in far) for axis, side in sides)
 
 
 def stream_problem(velocity: Velocity, sides: Kinds) -> str | None:
@@ -222,4 +228,4 @@ def stream_problem(velocity: Velocity, sides: Kinds) -> str | None:
         return None
     if not in_sea(sides):
         return PARTLY
-    return ACROSS if any(velocity[axis] for axis, side in sides if side.mirrors) else None
+    return ACROSS if any(velocity[axis] for axis, side in sides if is_mirror(side)) else None

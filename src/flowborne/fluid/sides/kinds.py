@@ -8,6 +8,7 @@ import numpy as np
 
 from flowborne.fluid.grid import Array
 from flowborne.fluid.sides.side import Boundary, Place, Profile, ScalarProfile
+from flowborne.kernels.arrays import FREE, PERIODIC, PRESCRIBED
 
 
 @dataclass(frozen=True)
@@ -15,7 +16,6 @@ class BoundaryClosed(Boundary):
     """Free-slip wall: beyond it the field is mirrored."""
 
     kind = "closed"
-    mirrors = True
 
 
 @dataclass(frozen=True)
@@ -24,6 +24,7 @@ class BoundaryNoSlip(Boundary):
 
     velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
     kind = "no-slip"
+    tangential = PRESCRIBED
 
     def prescribed_velocity(self, place: Place, component: int, time: float) -> float:
         return self.velocity[component] if component != place.axis else 0.0
@@ -36,6 +37,7 @@ class BoundaryInflow(Boundary):
     profile: Profile
     scalars: dict[str, ScalarProfile] = field(default_factory=dict)
     kind = "inflow"
+    tangential = PRESCRIBED
     supplies = True
 
     def prescribed_velocity(self, place: Place, component: int, time: float) -> Array:
@@ -58,10 +60,7 @@ class BoundaryOpen(Boundary):
     """
 
     kind = "open"
-    free = True
-
-    def prescribed_velocity(self, place: Place, component: int, time: float) -> None:
-        return None
+    normal = FREE
 
 
 @dataclass(frozen=True)
@@ -69,11 +68,4 @@ class BoundaryPeriodic(Boundary):
     """Joined to the opposite side: the last faces are the first ones."""
 
     kind = "periodic"
-    joined = True
-
-    def prescribed_velocity(self, place: Place, component: int, time: float) -> None:
-        return None
-
-    def impose(self, field: Array, place: Place, time: float) -> None:
-        if place.upper:
-            field[place.layer] = field[Place(place.grid, place.axis, upper=False).layer]
+    normal = tangential = PERIODIC

@@ -10,6 +10,7 @@ from typing import ClassVar
 import numpy as np
 
 from flowborne.fluid.grid import Array, Grid
+from flowborne.kernels.arrays import FREE, PERIODIC, PRESCRIBED
 
 Profile = Callable[[Array, Array, Array, float], tuple[Array, Array, Array]]
 """velocity(x, y, z, time) -> (u, v, w): broadcasting arrays in m and s to m/s."""
@@ -68,55 +69,60 @@ def _face_coordinates(place: Place, component: int) -> tuple[Array, Array, Array
 class Boundary:
     """One side of the domain; by default a wall that nothing crosses and nothing sticks to.
 
+    Solvers derive all that they need from the ghosts beyond a side, for each component
+
+        u_ghost = a u_inside + b        a = PRESCRIBED  -1, b = 2 u: the mean on the side is u
+                                            FREE         1, b = 0
+                                            PERIODIC     0, the ghost is inside the opposite side
+
+    The pressure has the opposite a as the normal velocity (between the two with a column of fluid
+    beyond, see `pressure_weight`), and b = 0: where the side prescribes the flux no pressure acts
+    on its faces, where it is free p = 0 on it, and what enters there has the mean velocity of the
+    fluid along all of it.
+
     A kind of side overrides what it does otherwise. Fields are indexed as in `Place`.
 
-    kind      its name in scenes and messages
-    free      whether the pressure determines the flux through it; otherwise the side prescribes it.
-              What enters through a free side has the mean velocity of the fluid along all of it
-    supplies  whether it prescribes a velocity at which fluid enters
-    joined    whether the fluid continues at the opposite side
-    endless   whether it continues beyond as if for ever
-    mirrors   whether the flow beyond would be the mirror image of that inside
+    kind        its name in scenes and messages
+    normal      a of the velocity across it
+    tangential  a of the velocity along it
+    supplies    whether fluid enters with the prescribed velocity. An inflow has a wall's a, but
+                dye comes in through it, a window may move across it, and its faces get their
+                velocity again after each substep
+    endless     whether the fluid beyond is a sea, which answers the flow inside. An open side has
+                the same a, and nothing beyond it
     """
 
     kind: ClassVar[str]
-    free: ClassVar[bool] = False
+    normal: ClassVar[int] = PRESCRIBED
+    tangential: ClassVar[int] = FREE
     supplies: ClassVar[bool] = False
-    joined: ClassVar[bool] = False
     endless: ClassVar[bool] = False
-    mirrors: ClassVar[bool] = False
-
-    @property
-    def prescribes(self) -> bool:
-        """Whether it prescribes the flux through it, so that no pressure acts on its faces."""
-        return not (self.free or self.joined)
 
     def among(self, pairs: Sequence[Pair]) -> Boundary:
         """The side in a domain whose sides are these, the lower and the upper one of each axis."""
         return self
 
-    def prescribed_velocity(
-        self, place: Place, component: int, time: float
-    ) -> Array | float | None:
-        """Component of velocity that it prescribes at `time` (s), m/s; None where it prescribes
-        none. Broadcasts over the layer at the side. A viscous fluid has friction with a side that
-        prescribes a tangential velocity.
+    def prescribed_velocity(self, place: Place, component: int, time: float) -> Array | float:
+        """Component u of velocity on it at `time` (s), where a is PRESCRIBED, m/s. Broadcasts over
+        the layer at the side. A viscous fluid has friction with a side that prescribes a tangential
+        velocity.
         """
-        return 0.0 if component == place.axis else None
+        return 0.0
 
     def impose(self, field: Array, place: Place, time: float) -> None:
-        """Set the normal velocity on its faces, in place, if it prescribes one."""
-        across = self.prescribed_velocity(place, place.axis, time)
-        if across is not None:
-            field[place.layer] = across
+        """Set the normal velocity on its faces, in place, if it is not free."""
+        if self.normal == PRESCRIBED:
+            field[place.layer] = self.prescribed_velocity(place, place.axis, time)
+        elif self.normal == PERIODIC and place.upper:
+            field[place.layer] = field[Place(place.grid, place.axis, upper=False).layer]
 
     def pressure_weight(self, place: Place) -> Array | float:
         """Acceleration of its faces by the pressure in the cells next to it, relative to that with
         p = 0 on the side: 0 if the flux is prescribed, 1 on an open side, (h/2) / (h/2 + l) with a
-        column of fluid of length l beyond. The pressure on the side is (1 - weight) times that in
-        the cell. Broadcasts over the layer at the side.
+        column of fluid of length l beyond. Of the pressure a = 1 - 2 weight, and that on the side
+        is (1 - weight) times that in the cell. Broadcasts over the layer at the side.
         """
-        return 1.0 if self.free or self.joined else 0.0
+        return 0.0 if self.normal == PRESCRIBED else 1.0
 
     def irrotational_inflow(self, place: Place) -> bool:
         """Whether fluid that comes in has no vorticity: its tangential velocity is then that of
