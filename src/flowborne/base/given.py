@@ -9,10 +9,11 @@ import stat
 import tomllib
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
-from numpy.typing import NDArray
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
 
 MOST_BYTES = 1 << 28
 """Maximum size of a file that is read whole, in bytes."""
@@ -96,6 +97,8 @@ def read_arrays(path: Path, names: Sequence[str] | None = None) -> dict[str, NDA
     raises  OSError if the file cannot be opened; ValueError if it is cut, empty or no archive,
             unpacks to more than MOST_UNPACKED, or lacks one of the names
     """
+    import numpy as np
+
     check_file(path, None)
     with open(path, "rb") as file:
         try:
