@@ -29,9 +29,10 @@ if TYPE_CHECKING:
     from flowborne.coupling.step import step
     from flowborne.coupling.stream import FlowState
     from flowborne.coupling.world import Fluid, Setup, World
-    from flowborne.fluid.grid import Array, Faces, Grid
+    from flowborne.fluid.grid import Grid
     from flowborne.fluid.state import FluidState
     from flowborne.formats.exporting import export
+    from flowborne.kernels.arrays import Array, Faces
     from flowborne.runs.open_run import OpenRun, open_run
     from flowborne.runs.run_folder import RunFolderError
     from flowborne.scenes.load import load_scene
@@ -115,7 +116,7 @@ PAGES = ("parts", "bodies", "play.gym", "machine", "pictures", "worlds")
 """Public modules of the package, besides itself."""
 
 _PLACES = {
-    "Array": "flowborne.fluid.grid",
+    "Array": "flowborne.kernels.arrays",
     "Batch": "flowborne.studies.batch_page",
     "BlowUpError": "flowborne.sim.simulation",
     "BodyState": "flowborne.solids.sensed",
@@ -124,7 +125,7 @@ _PLACES = {
     "Controller": "flowborne.control.controller",
     "Decision": "flowborne.control.controller",
     "ErrorBar": "flowborne.studies.error_bars",
-    "Faces": "flowborne.fluid.grid",
+    "Faces": "flowborne.kernels.arrays",
     "FlowState": "flowborne.coupling.stream",
     "Fluid": "flowborne.coupling.world",
     "FluidState": "flowborne.fluid.state",

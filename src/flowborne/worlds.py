@@ -25,7 +25,7 @@ from flowborne.fluid.boundary import Boundaries, Source
 from flowborne.fluid.control_volumes import control_volumes, face_masses
 from flowborne.fluid.control_volumes import kinetic_energy as kinetic_energy_of_fluid
 from flowborne.fluid.dye import Passage, nothing_brought
-from flowborne.fluid.grid import Array, Grid, faces_of
+from flowborne.fluid.grid import Grid, faces_of
 from flowborne.fluid.sides.far import BoundaryFar
 from flowborne.fluid.sides.kinds import (
     BoundaryClosed,
@@ -37,6 +37,7 @@ from flowborne.fluid.sides.kinds import (
 from flowborne.fluid.sides.side import Boundary, Profile
 from flowborne.fluid.transport import Transport
 from flowborne.fluid.wake import resampled
+from flowborne.kernels.arrays import Array
 from flowborne.solids import momentum
 from flowborne.solids.model import SolidModel
 from flowborne.solids.trajectories import JointCommand, Trajectory

@@ -23,6 +23,7 @@ from flowborne.control.rules import QuasiNewton
 from flowborne.coupling import step as stepping
 from flowborne.coupling.report import Outcome, StepReport
 from flowborne.coupling.world import World
+from flowborne.kernels.arrays import Integers
 from flowborne.motion.tracks import TrajectoryConstant
 from flowborne.solids.trajectories import JointCommand, ServoExact
 
@@ -30,7 +31,6 @@ MakeWorld = Callable[..., World]
 Step = Callable[[World, float, JointCommand | None], StepReport]
 SHOULDER = np.array([0])
 ARM = np.array([0, 1])
-Integers = np.ndarray
 
 
 def angle(measurement: Measurement) -> float:

@@ -13,9 +13,10 @@ from flowborne.coupling.step import step
 from flowborne.coupling.world import World
 from flowborne.fluid import transport
 from flowborne.fluid.control_volumes import face_masses
-from flowborne.fluid.grid import Array, Faces, Grid
+from flowborne.fluid.grid import Grid
 from flowborne.fluid.transport import damp_eddies
 from flowborne.kernels import carry as kernels
+from flowborne.kernels.arrays import Array, Faces
 from flowborne.kernels.flux import GHOSTS, Fluxes, Padded, Stage
 
 from ..kernels.references.flux import line_flux_reference, side_fluxes_reference

@@ -5,7 +5,6 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from flowborne.coupling.cut import cut_by_bodies
@@ -16,14 +15,13 @@ from flowborne.coupling.world import Fluid, Setup, World
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.grid import Grid
 from flowborne.fluid.sides.kinds import BoundaryOpen, BoundaryPeriodic
+from flowborne.kernels.arrays import Array
 from flowborne.solids.dynamics import kinematics
 from flowborne.solids.flesh import inversion
 from flowborne.solids.model import SolidModel
 from flowborne.solids.tissue.growth import Law, Tissue, add_flesh
 from flowborne.solids.trajectories import JointCommand
 from flowborne_validation.flesh_bars import bar_mesh
-
-Array = NDArray[np.float64]
 
 SIDE = 0.42
 GRAVITY = (0.0, 0.0, -9.81)

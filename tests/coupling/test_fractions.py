@@ -10,8 +10,9 @@ from scipy.spatial.transform import Rotation
 
 from flowborne.coupling.fractions import Geometry
 from flowborne.fluid.boundary import Boundaries
-from flowborne.fluid.grid import Array, Grid
+from flowborne.fluid.grid import Grid
 from flowborne.fluid.sides.kinds import BoundaryInflow, BoundaryOpen
+from flowborne.kernels.arrays import Array
 from flowborne.shapes.primitives import PRIMITIVES
 from flowborne.shapes.shape import Shape
 

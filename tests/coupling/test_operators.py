@@ -13,7 +13,8 @@ from flowborne.coupling.fractions import Geometry
 from flowborne.coupling.operators import add_flux, leak_proof, pressure_push
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.control_volumes import control_volumes, face_masses
-from flowborne.fluid.grid import Array, Faces, Grid
+from flowborne.fluid.grid import Grid
+from flowborne.kernels.arrays import Array, Faces
 from flowborne.kernels.projection import net_out
 
 Cut = Callable[..., Geometry]

@@ -16,8 +16,9 @@ from flowborne.coupling.overlaps import handed_on
 from flowborne.coupling.report import Outcome
 from flowborne.coupling.step import step
 from flowborne.fluid.boundary import Boundaries
-from flowborne.fluid.grid import Array, Grid
+from flowborne.fluid.grid import Grid
 from flowborne.fluid.sides.kinds import BoundaryOpen
+from flowborne.kernels.arrays import Array
 from flowborne.kernels.coupling_rows import COVERED, ENCLOSED, NARROW, WIDE
 from flowborne.sim.simulation import Simulation
 from flowborne.solids.dynamics import kinematics

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import pytest
 
 from flowborne.coupling.step import step
-from flowborne.fluid.grid import Array, Grid
+from flowborne.fluid.grid import Grid
 from flowborne.fluid.sides.side import Place
+from flowborne.kernels.arrays import Array
 from flowborne.solids.trajectories import JointCommand
 from flowborne.worlds import Boundaries, Boundary, BoundaryClosed, BoundaryOpen, make_world
 

@@ -6,13 +6,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from flowborne.coupling.step import step
 from flowborne.coupling.world import Fluid, Setup, World
 from flowborne.fluid.boundary import Boundaries
-from flowborne.fluid.grid import Array, Grid
+from flowborne.fluid.grid import Grid
 from flowborne.fluid.sides.kinds import BoundaryInflow, BoundaryOpen
+from flowborne.kernels.arrays import Array, Integers
 from flowborne.motion.tracks import Curve, TrajectoryKeyframes, TrajectorySinusoid
 from flowborne.solids.dynamics import Kinematics
 from flowborne.solids.model import SolidModel
@@ -130,7 +130,7 @@ PUPPET = """
 class Tumble:
     """A root that circles and turns about z, and a shoulder that swings about its own x."""
 
-    dofs: NDArray[np.int64]
+    dofs: Integers
 
     def position(self, time: float) -> Array:
         turn, swing = 0.5 * 2.0 * time, 0.5 * 0.6 * np.sin(5.0 * time)

@@ -9,7 +9,8 @@ import pytest
 
 import flowborne as fb
 from flowborne.coupling.world import World
-from flowborne.fluid.grid import Array, Grid
+from flowborne.fluid.grid import Grid
+from flowborne.kernels.arrays import Array
 from flowborne.sim.frame import Snapshot
 from flowborne.worlds import (
     Boundaries,

@@ -9,8 +9,9 @@ from flowborne.coupling.step import step
 from flowborne.coupling.stream import Sampled, WindStream
 from flowborne.coupling.world import Fluid, Setup, World
 from flowborne.fluid.boundary import Boundaries
-from flowborne.fluid.grid import Array, Grid
+from flowborne.fluid.grid import Grid
 from flowborne.fluid.sides.kinds import BoundaryInflow, BoundaryOpen
+from flowborne.kernels.arrays import Array
 from flowborne.solids.model import SolidModel
 from flowborne.solids.wind import WindFaces
 

@@ -11,7 +11,8 @@ import pytest
 from flowborne.coupling.cut import cells_to_follow, follow
 from flowborne.coupling.step import step
 from flowborne.coupling.world import World
-from flowborne.fluid.grid import Array, Grid
+from flowborne.fluid.grid import Grid
+from flowborne.kernels.arrays import Array
 from flowborne.worlds import (
     Boundaries,
     Boundary,

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from flowborne.fluid.boundary import Boundaries
-from flowborne.fluid.grid import Array, Grid
+from flowborne.fluid.grid import Grid
 from flowborne.fluid.sides.far import BoundaryFar
 from flowborne.fluid.sides.kinds import BoundaryClosed, BoundaryOpen, BoundaryPeriodic
+from flowborne.kernels.arrays import Array
 
 FAR, CLOSED, OPEN, RING = BoundaryFar(), BoundaryClosed(), BoundaryOpen(), BoundaryPeriodic()
 SLAB = Grid.slab(24, 12, 0.1, (-1.2, -0.6))

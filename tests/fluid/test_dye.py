@@ -8,9 +8,10 @@ import pytest
 from flowborne.fluid.boundary import Boundaries, Source, cells_in
 from flowborne.fluid.control_volumes import ControlVolumes, control_volumes
 from flowborne.fluid.dye import Passage, carry_dye, nothing_brought
-from flowborne.fluid.grid import Array, Faces, Grid, faces_of
+from flowborne.fluid.grid import Grid, faces_of
 from flowborne.fluid.sides.kinds import BoundaryInflow, BoundaryOpen, BoundaryPeriodic
 from flowborne.fluid.transport import Transport
+from flowborne.kernels.arrays import Array, Faces
 
 RING = BoundaryPeriodic()
 

@@ -7,7 +7,7 @@ import pytest
 
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.ghosts import face_grid, impose_sides, packed_sides, plane
-from flowborne.fluid.grid import Array, Faces, Grid
+from flowborne.fluid.grid import Grid
 from flowborne.fluid.sides.kinds import (
     BoundaryClosed,
     BoundaryInflow,
@@ -16,7 +16,7 @@ from flowborne.fluid.sides.kinds import (
     BoundaryPeriodic,
 )
 from flowborne.fluid.sides.side import Boundary
-from flowborne.kernels.arrays import FREE
+from flowborne.kernels.arrays import FREE, Array, Faces
 from flowborne.kernels.carry import fill_ghosts
 from flowborne.kernels.flux import GHOSTS
 

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from flowborne.fluid.boundary import Boundaries
-from flowborne.fluid.grid import Array, Faces, Grid
+from flowborne.fluid.grid import Grid
 from flowborne.fluid.sides.far import BoundaryFar
 from flowborne.fluid.sides.kinds import BoundaryOpen
 from flowborne.fluid.sides.side import Boundary, Place, tangential_change
 from flowborne.fluid.transport import NO_INLETS, Transport, carry_component
+from flowborne.kernels.arrays import Array, Faces
 from flowborne.worlds import control_volumes
 
 SLAB = Grid.slab(6, 5, 0.5, (0.0, 1.0))

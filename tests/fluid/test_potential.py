@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from flowborne.fluid.boundary import places
-from flowborne.fluid.grid import Array, Faces, Grid
+from flowborne.fluid.grid import Grid
 from flowborne.fluid.potential import (
     OnEdges,
     circulations,
@@ -16,6 +16,7 @@ from flowborne.fluid.potential import (
     source_velocity,
 )
 from flowborne.fluid.sides.side import Place
+from flowborne.kernels.arrays import Array, Faces
 
 SLAB = Grid.slab(11, 7, 0.5, (-1.0, 2.0))
 ROOM = Grid((7, 5, 6), 0.5, (-1.0, 2.0, 0.0))

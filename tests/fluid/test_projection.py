@@ -10,7 +10,7 @@ from flowborne.coupling.step import step
 from flowborne.coupling.world import Fluid, Setup, World
 from flowborne.fluid.boundary import Boundaries, Source
 from flowborne.fluid.ghosts import edge, impose_sides
-from flowborne.fluid.grid import Array, Faces, Grid, faces_of
+from flowborne.fluid.grid import Grid, faces_of
 from flowborne.fluid.projection import face_weights, pressure_gradient
 from flowborne.fluid.sides.kinds import (
     BoundaryClosed,
@@ -19,6 +19,7 @@ from flowborne.fluid.sides.kinds import (
     BoundaryOpen,
     BoundaryPeriodic,
 )
+from flowborne.kernels.arrays import Array, Faces
 from flowborne.kernels.projection import net_out
 from flowborne.solids.model import SolidModel
 from flowborne.solvers.pressure import PressureSystem

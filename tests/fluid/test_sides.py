@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from flowborne.fluid.boundary import Boundaries
-from flowborne.fluid.grid import Array, Grid
+from flowborne.fluid.grid import Grid
 from flowborne.fluid.sides.far import BoundaryFar
 from flowborne.fluid.sides.kinds import (
     BoundaryClosed,
@@ -16,7 +16,7 @@ from flowborne.fluid.sides.kinds import (
     BoundaryPeriodic,
 )
 from flowborne.fluid.sides.side import Boundary
-from flowborne.kernels.arrays import PERIODIC, PRESCRIBED
+from flowborne.kernels.arrays import PERIODIC, PRESCRIBED, Array
 from flowborne.scenes import sides as tables
 
 CUBE = Grid((6, 5, 4), 0.5, (0.0, 1.0, -1.0))

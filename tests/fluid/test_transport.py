@@ -11,7 +11,7 @@ from flowborne.coupling.mouths import at_faces
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.control_volumes import control_volumes
 from flowborne.fluid.ghosts import edge
-from flowborne.fluid.grid import Array, Faces, Grid, faces_of
+from flowborne.fluid.grid import Grid, faces_of
 from flowborne.fluid.sides.kinds import (
     BoundaryClosed,
     BoundaryInflow,
@@ -20,6 +20,7 @@ from flowborne.fluid.sides.kinds import (
     BoundaryPeriodic,
 )
 from flowborne.fluid.transport import COURANT, NO_INLETS, Transport, carry_component
+from flowborne.kernels.arrays import Array, Faces
 from flowborne.kernels.carry import Inlets
 
 from ..kernels.references.faces import face_means

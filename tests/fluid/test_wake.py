@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from flowborne.fluid.boundary import Boundaries
-from flowborne.fluid.grid import Array, Grid
+from flowborne.fluid.grid import Grid
 from flowborne.fluid.potential import circulations, edges_of
 from flowborne.fluid.sides.far import BoundaryFar, Sea
 from flowborne.fluid.sides.kinds import BoundaryClosed
@@ -26,6 +26,7 @@ from flowborne.fluid.wake import (
     wake_line,
     with_all_circulation_0,
 )
+from flowborne.kernels.arrays import Array
 
 GRID = Grid.slab(12, 8, 0.5, (-1.0, 2.0))
 ROOM = Grid((8, 6, 6), 0.5, (-1.0, -1.5, -1.5))

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flowborne.fluid.grid import Array
+from flowborne.kernels.arrays import Array
 from flowborne.kernels.corner_friction import AROUND, corner_form, find_corners
 from flowborne.kernels.edge_crossings import Crossings, new_crossings
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flowborne.fluid.grid import Array
+from flowborne.kernels.arrays import Array
 from flowborne.kernels.cut_faces import closed_face, open_edge
 from flowborne.kernels.edge_crossings import Crossings, new_crossings
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from flowborne.fluid.grid import Array
-from flowborne.kernels.arrays import Nodes
+from flowborne.kernels.arrays import Array, Nodes
 from flowborne.kernels.edge_crossings import (
     PIECES,
     Crossings,

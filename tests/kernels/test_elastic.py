@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from flowborne.kernels.arrays import Array
 from flowborne.kernels.elastic import (
     SAINT_VENANT_KIRCHHOFF,
     STABLE_NEO_HOOKEAN,
@@ -21,7 +21,6 @@ from flowborne.solids.elements import shape_gradients, with_middles
 
 from .references.elastic import stiffness_reference, stress_reference
 
-Array = NDArray[np.float64]
 LAWS = (SAINT_VENANT_KIRCHHOFF, STABLE_NEO_HOOKEAN)
 MODULI = (2.0, 3.0)
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import pyvista as pv
 
-from flowborne.fluid.grid import Array, Grid
-from flowborne.kernels.arrays import Integers
+from flowborne.fluid.grid import Grid
+from flowborne.kernels.arrays import Array, Integers
 from flowborne.kernels.closed_fractions import Piece, close_faces
 from flowborne.kernels.cut_faces import nodes_inside
 from flowborne.kernels.edge_crossings import new_crossings

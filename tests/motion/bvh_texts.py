@@ -6,10 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-Array = NDArray[np.float64]
+from flowborne.kernels.arrays import Array
 
 CHAIN = """HIERARCHY
 ROOT Hips

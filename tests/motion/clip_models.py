@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from flowborne.kernels.arrays import Array
 from flowborne.motion.clip import Clip
 from flowborne.motion.quaternions import about
 from flowborne.solids.model import SolidModel
-
-Array = NDArray[np.float64]
 
 NAMES = ("Hips", "Hip", "Twist", "Knee", "Ankle", "Head")
 PARENTS = np.array([-1, 0, 1, 2, 3, 0])

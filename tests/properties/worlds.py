@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from hypothesis import Phase
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from flowborne import Array, Grid, World
+from flowborne.kernels.arrays import Integers
 from flowborne.worlds import (
     Boundaries,
     Boundary,
@@ -39,7 +39,7 @@ ASIDE = np.array([0.0437, 0.0711, 0.0573])
 UNSHRUNK = (Phase.explicit, Phase.generate)
 """A failing world is told as it was found: to make it smaller would take minutes."""
 
-Turn = NDArray[np.int64]
+Turn = Integers
 """(3, 3) a rotation by right angles or a mirror: a matrix with one 1 or -1 in each row."""
 
 SAME: Turn = np.eye(3, dtype=np.int64)

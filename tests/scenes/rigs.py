@@ -6,13 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from flowborne.kernels.arrays import Array
 from flowborne.motion.human.gait import gait_clip
 from flowborne.motion.human.skeleton import standard_skeleton
-
-Array = NDArray[np.float64]
 
 FRAMES = (0, 3, 6, 9)
 """Of the generated walk, 120 a second."""

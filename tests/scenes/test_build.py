@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from numpy.typing import NDArray
 
 from flowborne.control.gradients import GradientCentral, GradientOneSided
 from flowborne.control.measurement import Measurement
@@ -20,6 +19,7 @@ from flowborne.control.phases import PhaseIntervals, PhaseTrack
 from flowborne.control.rules import GoldenSection
 from flowborne.coupling.stream import WindStream
 from flowborne.fluid.sides.kinds import BoundaryInflow, BoundaryNoSlip
+from flowborne.kernels.arrays import Array
 from flowborne.motion.inflow import FactorSteady
 from flowborne.scenes.build import Built, build
 from flowborne.scenes.load import load_scene
@@ -36,7 +36,7 @@ def cost(measurement: Measurement) -> float:
     return 3.0 * measurement.dt
 
 
-def whirl(x: NDArray[np.float64], time: float) -> NDArray[np.float64]:
+def whirl(x: Array, time: float) -> Array:
     """A user's own wind."""
     return np.stack([-x[:, 1], x[:, 0], 0.0 * x[:, 0]], axis=1)
 

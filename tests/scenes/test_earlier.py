@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from flowborne.base.errors import SceneError
 from flowborne.cli import main as cli
+from flowborne.kernels.arrays import Array
 from flowborne.motion.quaternions import inverse, product
 from flowborne.scenes.bodies import trajectories_of
 from flowborne.scenes.build import build
@@ -22,7 +22,6 @@ from flowborne.scenes.notes import notes_of
 
 from ..made_runs import numbers, run
 
-Array = NDArray[np.float64]
 Write = Callable[..., Path]
 
 MODEL = """

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flowborne.kernels.arrays import Array
 from flowborne.motion.human.skeleton import SIDES
 from flowborne.motion.quaternions import twist
 from flowborne.scenes.load import load_scene
@@ -36,7 +36,7 @@ class Walked:
     """
 
     lean: float
-    ahead: NDArray[np.float64]
+    ahead: Array
     drag: float
     torque: float
     sunk: float
@@ -111,7 +111,7 @@ def test_feet_stand_on_the_ground() -> None:
     assert walked("gravity-back").sunk < 0.005
 
 
-def swings(scene: str, settings: dict[str, str]) -> NDArray[np.float64]:
+def swings(scene: str, settings: dict[str, str]) -> Array:
     """(2,) degrees over which left and right upper arm go to and fro in a stride."""
     angles = []
     with Simulation(load_scene(scene, settings)) as simulation:

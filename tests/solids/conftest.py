@@ -6,13 +6,11 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from flowborne.kernels.arrays import Array
 from flowborne.solids.dynamics import assemble
 from flowborne.solids.model import SolidModel, SolidState
 from flowborne.solids.prescribed import PrescribedSystem, prescribe
-
-Array = NDArray[np.float64]
 
 
 def advance_by(

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from flowborne.kernels.arrays import Array, Integers
 from flowborne.solids.elements import (
     corners,
     lumped,
@@ -17,14 +17,11 @@ from flowborne.solids.elements import (
 )
 from flowborne_validation.flesh_bars import bar_mesh, flat_mesh
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
-
 MESHES = {"room": bar_mesh((3, 2, 2), (0.3, 0.1, 0.2)), "slab": flat_mesh((3, 2), (0.3, 0.1))}
 WHOLE = {"room": 0.3 * 0.1 * 0.2, "slab": 0.3 * 0.1}
 
 
-def quadratic(kind: str) -> tuple[Array, Indices]:
+def quadratic(kind: str) -> tuple[Array, Integers]:
     points, simplices = MESHES[kind]
     edges, elements = with_middles(len(points), simplices)
     return np.concatenate([points, points[edges].mean(axis=1)]), elements

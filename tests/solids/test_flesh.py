@@ -7,9 +7,9 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.linalg import eigh
 
+from flowborne.kernels.arrays import Array
 from flowborne.solids.constraints import ACTIVE, ONE_SIDED
 from flowborne.solids.dynamics import assemble
 from flowborne.solids.elements import surface_of
@@ -21,8 +21,6 @@ from flowborne.solids.scratch import scratch
 from flowborne.solids.tissue.growth import Grown, Law, Tissue, add_flesh
 from flowborne_validation.flag_in_channel import flag_of, flag_tissue
 from flowborne_validation.flesh_bars import bar_mesh, flat_mesh
-
-Array = NDArray[np.float64]
 
 DT = 2e-3
 

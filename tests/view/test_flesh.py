@@ -12,6 +12,7 @@ import pytest
 
 from flowborne.cli.main import main
 from flowborne.coupling.world import Setup, World
+from flowborne.kernels.arrays import Pixels
 from flowborne.runs.history import History
 from flowborne.runs.recorder import Recorder, write_model
 from flowborne.runs.run_folder import RunFolder
@@ -25,8 +26,6 @@ from flowborne.view.pictures import Picture
 from flowborne.view.run import Run
 from flowborne.view.shot import Shot
 from flowborne_validation.flesh_bars import bar_mesh, flat_mesh
-
-Pixels = np.ndarray
 
 BONE = """<mujoco><worldbody><body name="bone"><joint name="turn" axis="0 0 1"/>
 <geom type="box" size=".15 .03 .3" pos=".3 0 0"/></body></worldbody></mujoco>"""

@@ -9,6 +9,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
+from flowborne.kernels.arrays import Pixels
 from flowborne.view import style
 from flowborne.view.fields import (
     FieldDye,
@@ -25,7 +26,6 @@ from flowborne.view.plots import shortened
 from flowborne.view.run import Run
 
 Write = Callable[..., Path]
-Pixels = np.ndarray
 
 
 def rgb(colour: str) -> Pixels:

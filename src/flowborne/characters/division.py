@@ -17,10 +17,10 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from flowborne.base.errors import SceneError
-from flowborne.characters.rig import PLAIN, Array, Integers, Rig, Surface
+from flowborne.characters.rig import PLAIN, Rig, Surface
+from flowborne.kernels.arrays import Array, Integers, Mesh
 from flowborne.shapes.closing import SMALL_HOLE, across_of, fans, loops_of, rims_of, wound
 from flowborne.shapes.mesh import ShapeMesh
-from flowborne.shapes.shape import Mesh
 from flowborne.shapes.thickness import connected, split_quads
 
 WELD_DISTANCE = 1e-7

@@ -13,8 +13,9 @@ from flowborne.base.errors import SceneError
 from flowborne.characters.division import Division, divided
 from flowborne.characters.limits import check_work
 from flowborne.characters.model import as_cycle, clip_of, model_files, posed
-from flowborne.characters.rig import Action, Array, Rig, Surface, printable, scaled, size_notes
+from flowborne.characters.rig import Action, Rig, Surface, printable, scaled, size_notes
 from flowborne.characters.source import clip_number, read_source
+from flowborne.kernels.arrays import Array
 from flowborne.motion.bvh import bvh_text
 from flowborne.motion.clip import Clip
 from flowborne.scenes.build import build

@@ -21,8 +21,6 @@ from flowborne.characters.limits import check_size, wrong
 from flowborne.characters.rig import (
     Z_UP,
     Action,
-    Array,
-    Integers,
     Rig,
     Surface,
     frame_times,
@@ -34,6 +32,7 @@ from flowborne.characters.rig import (
     sampled_action,
     unique_names,
 )
+from flowborne.kernels.arrays import Array, Integers
 
 PACKED = ("KHR_draco_mesh_compression", "EXT_meshopt_compression")
 """Extensions that compress the arrays."""

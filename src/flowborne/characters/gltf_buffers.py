@@ -20,7 +20,8 @@ from flowborne.base.colours import to_linear, to_srgb
 from flowborne.base.errors import SceneError
 from flowborne.characters.gltf_document import Document, Primitive, TextureInfo, embedded
 from flowborne.characters.limits import wrong
-from flowborne.characters.rig import PLAIN, Array, Integers
+from flowborne.characters.rig import PLAIN
+from flowborne.kernels.arrays import Array, Integers
 
 KINDS = {
     5120: np.int8,

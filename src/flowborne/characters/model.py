@@ -13,11 +13,11 @@ from PIL import Image
 from scipy.spatial.transform import Rotation
 
 from flowborne.characters.division import Division
-from flowborne.characters.rig import Action, Array, Integers, Rig, Surface
+from flowborne.characters.rig import Action, Rig, Surface
+from flowborne.kernels.arrays import Array, Integers, Mesh
 from flowborne.motion.clip import Clip
 from flowborne.motion.clip_curves import MAX_CYCLE_MISMATCH
 from flowborne.motion.quaternions import angle, inverse, product
-from flowborne.shapes.shape import Mesh
 from flowborne.solids.geoms import DISPLACED
 
 MAX_INFLUENCES = 8

@@ -25,8 +25,6 @@ from flowborne.characters.rig import (
     PLAIN,
     Z_UP,
     Action,
-    Array,
-    Integers,
     Rig,
     Surface,
     frame_times,
@@ -39,6 +37,7 @@ from flowborne.characters.rig import (
     unique_names,
 )
 from flowborne.characters.usd_gate import EVERYTHING, open_stage, reading_usd
+from flowborne.kernels.arrays import Array, Integers
 
 Result = TypeVar("Result")
 

@@ -17,8 +17,8 @@ from flowborne.coupling.solve import solve_bodies
 from flowborne.coupling.step_report import report_bodies
 from flowborne.coupling.stream import winds_on
 from flowborne.coupling.world import World
-from flowborne.fluid.grid import Array
 from flowborne.fluid.transport import parts_for
+from flowborne.kernels.arrays import Array
 from flowborne.solids.driven import Driven, drive
 from flowborne.solids.dynamics import kinematics
 from flowborne.solids.following import follow

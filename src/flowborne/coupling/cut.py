@@ -21,9 +21,9 @@ from flowborne.fluid.control_volumes import (
     fluid_momentum,
 )
 from flowborne.fluid.ghosts import edge
-from flowborne.fluid.grid import Array, Faces
 from flowborne.fluid.state import FluidState
 from flowborne.fluid.window import Window, moved_fluid
+from flowborne.kernels.arrays import Array, Faces
 from flowborne.solids.dynamics import Kinematics, kinematics
 from flowborne.solids.model import SolidModel, SolidState
 

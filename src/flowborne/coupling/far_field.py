@@ -20,10 +20,11 @@ from flowborne.coupling.cut import Departure, moved_since
 from flowborne.coupling.flow import AdvectionResult
 from flowborne.coupling.operators import boundary_velocity, leak_proof
 from flowborne.coupling.world import Fluid, World
-from flowborne.fluid.grid import Array, Faces, faces_of
+from flowborne.fluid.grid import faces_of
 from flowborne.fluid.potential import Normal, brought
 from flowborne.fluid.projection import accelerated
 from flowborne.fluid.wake import induced
+from flowborne.kernels.arrays import Array, Faces
 from flowborne.solids.dynamics import kinematics
 
 

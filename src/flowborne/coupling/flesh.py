@@ -14,8 +14,8 @@ import numpy as np
 from flowborne.coupling.images import displaced
 from flowborne.coupling.shapes import WATERTIGHT
 from flowborne.fluid.boundary import Boundaries
-from flowborne.fluid.grid import Array, Grid, faces_of
-from flowborne.kernels.arrays import Integers
+from flowborne.fluid.grid import Grid, faces_of
+from flowborne.kernels.arrays import Array, Integers
 from flowborne.kernels.closed_fractions import Piece
 from flowborne.kernels.edge_crossings import PIECES, Crossings, new_crossings
 from flowborne.kernels.node_distance import BAND

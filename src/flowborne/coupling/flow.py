@@ -25,10 +25,10 @@ from flowborne.fluid.boundary import cells_in
 from flowborne.fluid.control_volumes import ControlVolumes, control_volumes
 from flowborne.fluid.dye import Dyed, Passage, carry_dye
 from flowborne.fluid.ghosts import edge, impose_sides
-from flowborne.fluid.grid import Array, Faces, faces_of
+from flowborne.fluid.grid import faces_of
 from flowborne.fluid.projection import accelerated
 from flowborne.fluid.transport import Transport, carry_component, damp_eddies
-from flowborne.kernels.arrays import PERIODIC
+from flowborne.kernels.arrays import PERIODIC, Array, Faces
 from flowborne.kernels.faces import changes_of_step, still_to_come
 from flowborne.solids.dynamics import Kinematics
 

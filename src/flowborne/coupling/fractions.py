@@ -13,8 +13,8 @@ from flowborne.coupling.overlaps import handed_on
 from flowborne.coupling.shapes import Shapes
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.ghosts import edge
-from flowborne.fluid.grid import Array, Faces, Grid
-from flowborne.kernels.arrays import PRESCRIBED, Integers, Mask, Rows
+from flowborne.fluid.grid import Grid
+from flowborne.kernels.arrays import PRESCRIBED, Array, Faces, Integers, Mask, Rows
 from flowborne.kernels.closed_fractions import (
     Piece,
     close_faces,

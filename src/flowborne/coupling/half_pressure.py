@@ -22,8 +22,9 @@ from flowborne.coupling.cut import Departure, moved_since
 from flowborne.coupling.operators import pressure_push, side_push
 from flowborne.coupling.world import Fluid, World
 from flowborne.fluid.control_volumes import each_once, face_masses, fluid_momentum
-from flowborne.fluid.grid import Array, Faces, faces_of
+from flowborne.fluid.grid import faces_of
 from flowborne.fluid.projection import pressure_gradient
+from flowborne.kernels.arrays import Array, Faces
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,8 @@ from itertools import product
 import numpy as np
 
 from flowborne.fluid.boundary import Boundaries
-from flowborne.fluid.grid import Array, Grid
-from flowborne.kernels.arrays import Integers
+from flowborne.fluid.grid import Grid
+from flowborne.kernels.arrays import Array, Integers
 
 
 def periods(grid: Grid, sides: Boundaries) -> Array:

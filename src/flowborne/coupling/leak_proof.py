@@ -30,9 +30,9 @@ from flowborne.coupling.operators import beyond_sides
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.control_volumes import NONE
 from flowborne.fluid.ghosts import impose_sides
-from flowborne.fluid.grid import Array, Faces, Grid
+from flowborne.fluid.grid import Grid
 from flowborne.fluid.projection import PressureGradient
-from flowborne.kernels.arrays import PERIODIC, PRESCRIBED, Integers
+from flowborne.kernels.arrays import PERIODIC, PRESCRIBED, Array, Faces, Integers
 from flowborne.kernels.control_volumes import neighbour
 from flowborne.kernels.dye import face_of
 from flowborne.kernels.faces import mean_flux

@@ -24,10 +24,10 @@ from flowborne.base.errors import BreakdownError
 from flowborne.coupling.fractions import Geometry
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.dye import Brought
-from flowborne.fluid.grid import Array, Grid
+from flowborne.fluid.grid import Grid
 from flowborne.fluid.sides.far import Strength
 from flowborne.fluid.transport import NO_INLETS
-from flowborne.kernels.arrays import Integers, Mask
+from flowborne.kernels.arrays import Array, Integers, Mask
 from flowborne.kernels.carry import Inlets
 from flowborne.solids.dynamics import Kinematics
 

@@ -13,9 +13,9 @@ import numpy as np
 
 from flowborne.coupling.fractions import Geometry
 from flowborne.fluid.dipoles import Dipoles
-from flowborne.fluid.grid import Array, Faces, Grid
+from flowborne.fluid.grid import Grid
 from flowborne.fluid.projection import PressureGradient
-from flowborne.kernels.arrays import FREE, DenseTerm
+from flowborne.kernels.arrays import FREE, Array, DenseTerm, Faces
 from flowborne.kernels.coupling_rows import add_body_velocity
 from flowborne.kernels.sparse_rows import add_rows, sum_rows
 from flowborne.solids.dynamics import Kinematics

@@ -25,8 +25,8 @@ from __future__ import annotations
 import numpy as np
 
 from flowborne.fluid.ghosts import edge
-from flowborne.kernels.arrays import Integers, Rows
-from flowborne.kernels.coupling_rows import COVERED, NARROW, WIDE, Kinds
+from flowborne.kernels.arrays import Integers, Kinds, Rows
+from flowborne.kernels.coupling_rows import COVERED, NARROW, WIDE
 
 
 def handed_on(rows: Rows, kind: Kinds, columns: int, periodic: tuple[bool, bool, bool]) -> Rows:

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from flowborne.fluid.grid import Array, Grid
+from flowborne.fluid.grid import Grid
+from flowborne.kernels.arrays import Array, Integers, Mask, Mesh
 from flowborne.kernels.distance import SPHERE
 from flowborne.kernels.edge_crossings import Placed
 from flowborne.shapes.mesh import ShapeThickened, smooth_sheets
-from flowborne.shapes.shape import Mesh, Shape
+from flowborne.shapes.shape import Shape
 from flowborne.solids.model import SolidModel
 
 WATERTIGHT = {True: np.sqrt(2.0) / 2.0 * 1.01, False: np.sqrt(3.0) / 2.0 * 1.01}
@@ -42,18 +42,18 @@ class Shapes:
     sheets  (ng,) whether the samples are of sheets within a skin
     """
 
-    kind: NDArray[np.int64]
+    kind: Integers
     size: Array
     reach: Array
-    body: NDArray[np.int64]
-    source: NDArray[np.int64]
+    body: Integers
+    source: Integers
     tables: Array
-    table: NDArray[np.int64]
+    table: Integers
     corner: Array
     pitch: Array
     skins: dict[int, Mesh]
-    pieces: dict[int, NDArray[np.int64]]
-    sheets: NDArray[np.bool_]
+    pieces: dict[int, Integers]
+    sheets: Mask
 
     def placed(self, position: Array, rotation: Array) -> list[Placed]:
         """The geometries at positions (ng, 3), m, and in rotations (ng, 3, 3), for kernels."""

@@ -35,9 +35,9 @@ from flowborne.coupling.operators import (
 from flowborne.coupling.report import Outcome, timed
 from flowborne.coupling.viscous_solve import diffuse
 from flowborne.coupling.world import Fluid, World
-from flowborne.fluid.grid import Array, Faces, Grid, faces_of
+from flowborne.fluid.grid import Grid, faces_of
 from flowborne.fluid.projection import face_weights, pressure_gradient
-from flowborne.kernels.arrays import ROUNDING, Integers
+from flowborne.kernels.arrays import ROUNDING, Array, Faces, Integers
 from flowborne.kernels.faces import largest_open
 from flowborne.kernels.projection import net_out
 from flowborne.solids.driven import Driven, within_limits

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flowborne.base.errors import BreakdownError
 from flowborne.coupling.bodies_step import parts_of, position_velocity
@@ -11,6 +10,7 @@ from flowborne.coupling.drives import joint_command
 from flowborne.coupling.report import Outcome
 from flowborne.coupling.step import step_part
 from flowborne.coupling.world import World
+from flowborne.kernels.arrays import Mask
 from flowborne.solids.trajectories import JointCommand
 
 INSTANT = 1e-9
@@ -18,10 +18,7 @@ INSTANT = 1e-9
 
 
 def start(
-    world: World,
-    dt: float,
-    given: NDArray[np.bool_] | None = None,
-    command: JointCommand | None = None,
+    world: World, dt: float, given: Mask | None = None, command: JointCommand | None = None
 ) -> None:
     """Take the velocities of the start to the middle of the first step, in place.
 
@@ -58,7 +55,7 @@ def start(
     world.setup, world.time, world.steps, world.ahead = setup, time, 0, half
 
 
-def set_going(world: World, given: NDArray[np.bool_] | None = None) -> None:
+def set_going(world: World, given: Mask | None = None) -> None:
     """Set the fluid going with its bodies, as by an impulse at the start, in place.
 
     The velocity of the fluid becomes that with the same circulation that flows around the moving

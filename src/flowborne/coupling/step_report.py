@@ -17,7 +17,7 @@ from flowborne.coupling.solve import Solved, SolvedFlow
 from flowborne.coupling.stream import winds_on
 from flowborne.coupling.world import World
 from flowborne.fluid.control_volumes import fluid_momentum, momentum_change
-from flowborne.fluid.grid import Array, Faces
+from flowborne.kernels.arrays import Array, Faces
 from flowborne.solids.dynamics import Kinematics
 from flowborne.solids.flesh import Flesh
 from flowborne.solids.model import SolidModel

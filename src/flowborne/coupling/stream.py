@@ -10,7 +10,8 @@ from scipy.ndimage import map_coordinates
 
 from flowborne.coupling.cut import cut_by_bodies
 from flowborne.coupling.world import World
-from flowborne.fluid.grid import Array, Faces, Grid
+from flowborne.fluid.grid import Grid
+from flowborne.kernels.arrays import Array, Faces
 from flowborne.solids.dynamics import Kinematics
 from flowborne.solids.model import SolidModel
 from flowborne.solids.wind import Wind, WindFaces

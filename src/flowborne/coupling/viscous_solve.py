@@ -31,10 +31,10 @@ from flowborne.coupling.report import timed
 from flowborne.coupling.world import World
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.ghosts import edge
-from flowborne.fluid.grid import Array, Faces, Grid
+from flowborne.fluid.grid import Grid
 from flowborne.fluid.projection import PressureGradient
 from flowborne.fluid.viscosity import OpenParts, ViscousFaces, assemble_viscosity
-from flowborne.kernels.arrays import Integers, Mask
+from flowborne.kernels.arrays import Array, Faces, Integers, Mask
 from flowborne.kernels.corner_friction import AROUND
 from flowborne.kernels.projection import fill_fresh
 from flowborne.kernels.sparse_rows import add_rows, sum_rows

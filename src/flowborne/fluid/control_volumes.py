@@ -20,8 +20,8 @@ import numpy as np
 
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.ghosts import edge, face_grid, plane, planes
-from flowborne.fluid.grid import Array, Faces, Grid, faces_of, inner_product
-from flowborne.kernels.arrays import Integers
+from flowborne.fluid.grid import Grid, faces_of, inner_product
+from flowborne.kernels.arrays import Array, Faces, Integers
 from flowborne.kernels.control_volumes import (
     Closed,
     Transfers,

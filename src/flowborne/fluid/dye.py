@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 from flowborne.fluid.boundary import Boundaries, Source, cells_in
 from flowborne.fluid.control_volumes import WHOLE as UNCUT
 from flowborne.fluid.ghosts import Scalar, edge
-from flowborne.fluid.grid import Array, Grid, faces_of, inner_product
+from flowborne.fluid.grid import Grid, faces_of, inner_product
 from flowborne.fluid.sides.side import Place
 from flowborne.fluid.transport import SUBSTEPS, Transport, parts_for
-from flowborne.kernels.arrays import Integers, Marks
+from flowborne.kernels.arrays import Array, Integers, Marks
 from flowborne.kernels.control_volumes import mark_cut
 from flowborne.kernels.dye import CUT, WHOLE, CutCells, list_flows, pass_on, sort_cells, sweep
 

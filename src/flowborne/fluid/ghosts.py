@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flowborne.fluid.boundary import Boundaries
-from flowborne.fluid.grid import Faces, Grid
+from flowborne.fluid.grid import Grid
 from flowborne.fluid.sides.side import tangential_change
-from flowborne.kernels.arrays import PRESCRIBED, FaceGrid
+from flowborne.kernels.arrays import PRESCRIBED, FaceGrid, Faces
 from flowborne.kernels.carry import Sides
 
 Scalar = TypeVar("Scalar", bound=np.generic)

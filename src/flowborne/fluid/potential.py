@@ -20,9 +20,10 @@ import numpy as np
 from scipy import fft
 
 from flowborne.fluid.boundary import places
-from flowborne.fluid.grid import Array, Faces, Grid
+from flowborne.fluid.grid import Grid
 from flowborne.fluid.sides.far import Sea
 from flowborne.fluid.sides.side import Place
+from flowborne.kernels.arrays import Array, Faces
 from flowborne.kernels.potentials import sum_layers
 from flowborne.kernels.projection import net_out
 

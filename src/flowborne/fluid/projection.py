@@ -18,7 +18,8 @@ import numpy as np
 
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.dipoles import Dipoles
-from flowborne.fluid.grid import Array, Faces, Grid, faces_of
+from flowborne.fluid.grid import Grid, faces_of
+from flowborne.kernels.arrays import Array, Faces
 from flowborne.kernels.faces import accelerate
 from flowborne.kernels.projection import subtract_gradient
 

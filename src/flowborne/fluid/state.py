@@ -6,7 +6,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from flowborne.fluid.grid import Array, Faces, Grid
+from flowborne.fluid.grid import Grid
+from flowborne.kernels.arrays import Array, Faces
 
 
 @dataclass

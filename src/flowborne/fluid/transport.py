@@ -32,8 +32,8 @@ import numpy as np
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.control_volumes import NONE, NOTHING, ControlVolumes
 from flowborne.fluid.ghosts import edge, face_grid, packed_sides, plane, planes
-from flowborne.fluid.grid import Array, Faces, Grid
-from flowborne.kernels.arrays import Integers, Marks
+from flowborne.fluid.grid import Grid
+from flowborne.kernels.arrays import Array, Faces, Integers, Marks
 from flowborne.kernels.carry import Exchange, Inlets, Scratch, Volumes, carry, prepare
 from flowborne.kernels.control_volumes import Transfers
 from flowborne.kernels.eddies import edges_near, exchange, exchanges

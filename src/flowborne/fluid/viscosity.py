@@ -31,8 +31,8 @@ from typing import NamedTuple
 import numpy as np
 
 from flowborne.fluid.boundary import Boundaries
-from flowborne.fluid.grid import Array, Faces, Grid
-from flowborne.kernels.arrays import PRESCRIBED, Integers, Marks
+from flowborne.fluid.grid import Grid
+from flowborne.kernels.arrays import PRESCRIBED, Array, Faces, Integers, Marks
 from flowborne.kernels.control_volumes import CLOSED_BELOW
 from flowborne.kernels.corner_friction import corner_stiffness, find_corners
 from flowborne.kernels.edge_crossings import Crossings

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flowborne.fluid.ghosts import edge
-from flowborne.fluid.grid import Array, Faces, Grid
+from flowborne.fluid.grid import Grid
 from flowborne.fluid.potential import (
     Normal,
     OnEdges,
@@ -29,6 +29,7 @@ from flowborne.fluid.potential import (
 )
 from flowborne.fluid.sides.far import Sea
 from flowborne.fluid.sides.side import Place
+from flowborne.kernels.arrays import Array, Faces
 from flowborne.kernels.potentials import wake_potential
 
 BINS = 64

@@ -8,11 +8,11 @@ import numpy as np
 
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.ghosts import edge
-from flowborne.fluid.grid import Array, Faces, Grid, faces_of
+from flowborne.fluid.grid import Grid, faces_of
 from flowborne.fluid.sides.side import Boundary, Place, tangential_change
 from flowborne.fluid.state import FluidState
 from flowborne.fluid.wake import after_move
-from flowborne.kernels.arrays import FREE, PRESCRIBED
+from flowborne.kernels.arrays import FREE, PRESCRIBED, Array, Faces
 
 
 @dataclass(frozen=True)

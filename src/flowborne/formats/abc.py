@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from flowborne.base.atomic import replaced_whole
 from flowborne.base.extras import optional
 from flowborne.base.version import __version__
-from flowborne.formats.creature import Array, Creature, Integers
+from flowborne.formats.creature import Creature
+from flowborne.kernels.arrays import Array, Integers
 from flowborne.runs.exporters import provided
 from flowborne.runs.open_run import OpenRun
 

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from flowborne.base.errors import SceneError
-from flowborne.formats.creature import Array, Creature, quaternions, relative_to_parents
+from flowborne.formats.creature import Creature, quaternions, relative_to_parents
+from flowborne.kernels.arrays import Array
 from flowborne.motion.bvh import write_clip
 from flowborne.motion.clip import Clip
 from flowborne.runs.exporters import Written, provided

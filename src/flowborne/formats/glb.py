@@ -14,8 +14,9 @@ from flowborne.base.atomic import replaced_whole
 from flowborne.base.colours import to_linear
 from flowborne.base.extras import optional
 from flowborne.base.version import __version__
-from flowborne.formats.creature import Array, Creature, Integers, ModelSkin, Surface, quaternions
+from flowborne.formats.creature import Creature, ModelSkin, Surface, quaternions
 from flowborne.formats.morphs import morphed, strongest
+from flowborne.kernels.arrays import Array, Integers
 from flowborne.motion.quaternions import continuous
 from flowborne.runs.exporters import Written, provided
 from flowborne.runs.open_run import OpenRun

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flowborne.formats.creature import Array, Creature, Integers, Skin
+from flowborne.formats.creature import Creature, Skin
+from flowborne.kernels.arrays import Array, Integers
 
 MIN_SINGULAR_VALUE = 1e-2
 """Singular value of a vertex's blended rotation below which targets do not act in its direction."""

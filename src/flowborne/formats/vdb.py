@@ -22,13 +22,12 @@ from numpy.typing import NDArray
 
 from flowborne.base.atomic import write_atomically
 from flowborne.base.errors import SceneError
+from flowborne.kernels.arrays import Integers, Mask, Single
 from flowborne.runs.exporters import Written, provided
 from flowborne.runs.open_run import OpenRun
 from flowborne.runs.states import cell_velocity
 
 Number = TypeVar("Number", np.bool_, np.float32)
-Single = NDArray[np.float32]
-Mask = NDArray[np.bool_]
 
 MAGIC, VERSION, LIBRARY = 0x56444220, 224, (10, 0)
 """Magic number of the file, version of the format, and version of the library that is imitated."""
@@ -176,7 +175,7 @@ def _write_tree(out: BytesIO, active: Mask, components: int) -> list[tuple[int, 
     return corners
 
 
-def _write_node(out: BytesIO, used: Mask, first: NDArray[np.int64], side: int) -> NDArray[np.int64]:
+def _write_node(out: BytesIO, used: Mask, first: Integers, side: int) -> Integers:
     """Write a node of `side`^3 possible children; returns the indices (n, 3) of those in `used`."""
     box = np.zeros((side,) * 3, bool)
     part = used[tuple(slice(f, f + side) for f in first)]

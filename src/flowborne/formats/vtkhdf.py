@@ -27,7 +27,8 @@ from numpy.typing import NDArray
 
 from flowborne.base.atomic import replaced_whole
 from flowborne.base.extras import optional
-from flowborne.formats.creature import Array, Creature, Integers, has_bodies
+from flowborne.formats.creature import Creature, has_bodies
+from flowborne.kernels.arrays import Array, Integers
 from flowborne.kernels.elastic import STABLE_NEO_HOOKEAN
 from flowborne.runs.exporters import provided
 from flowborne.runs.open_run import OpenRun

@@ -7,13 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit, prange
-from numpy.typing import NDArray
 
-from flowborne.kernels.arrays import PRESCRIBED, Array, Integers, Rows
+from flowborne.kernels.arrays import PRESCRIBED, Array, Integers, Kinds, Mask, Rows
 from flowborne.kernels.closed_fractions import Piece
 from flowborne.kernels.jit import inlined, kernel
 
-Kinds = NDArray[np.int8]
 ENCLOSED, COVERED, NARROW, WIDE = 0, 1, 2, 3
 """Kinds of cells: closed in by bodies and solid sides of the domain; all faces closed by bodies; an
 open face, but none by half; a face open by half or more."""
@@ -105,7 +103,7 @@ def cell_wrench(wrench: Array, i: int, j: int, k: int, piece: Piece) -> None:
 
 
 @njit(nogil=True, cache=True)
-def list_cells(piece: Piece, listed: NDArray[np.bool_]) -> tuple[Integers, Array]:
+def list_cells(piece: Piece, listed: Mask) -> tuple[Integers, Array]:
     """Listed cells (n,) with a coupling row of one body, flat, and (n, 6) its values, the wrench of
     unit pressure. Where the body closes as much on either side of a cell, at the same place, it has
     no row."""
@@ -138,7 +136,7 @@ def flesh_rows(
     weight: Array,
     first_column: int,
     area: float,
-    listed: NDArray[np.bool_],
+    listed: Mask,
 ) -> tuple[Integers, Rows]:
     """Coupling rows of the cells beside closed parts of faces: one row per part and listed cell.
 

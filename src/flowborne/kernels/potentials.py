@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit, prange
-from numpy.typing import NDArray
 
-from flowborne.kernels.arrays import Array
+from flowborne.kernels.arrays import Array, Complex
 from flowborne.kernels.jit import kernel
-
-Complex = NDArray[np.complex128]
 
 
 @kernel

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from xarray.backends import BackendArray
 from xarray.core import indexing
 
-from flowborne.fluid.grid import Array, Grid
+from flowborne.fluid.grid import Grid
+from flowborne.kernels.arrays import Array, Integers
 from flowborne.runs.states import Quantity, StateArray
 
 
@@ -42,7 +43,7 @@ def state_variable(array: StateArray) -> xarray.Variable:
 
 
 def history_variable(
-    quantity: Quantity, known: Array, rows: NDArray[np.int64], frames: Sequence[int]
+    quantity: Quantity, known: Array, rows: Integers, frames: Sequence[int]
 ) -> xarray.Variable:
     """A quantity of the history at the times of the states, nan for states without a row."""
     values = np.full((len(frames), *known.shape[1:]), np.nan)

@@ -14,7 +14,7 @@ import numpy as np
 
 from flowborne.base.atomic import write_text
 from flowborne.base.given import MOST_BYTES, check_file
-from flowborne.fluid.grid import Array
+from flowborne.kernels.arrays import Array
 from flowborne.runs.states import Quantity
 
 UNITS = {

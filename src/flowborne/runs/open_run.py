@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from flowborne.base.extras import optional
 from flowborne.base.given import read_json
-from flowborne.fluid.grid import Array, Grid
+from flowborne.fluid.grid import Grid
+from flowborne.kernels.arrays import Array, Integers
 from flowborne.runs.history import history_arrays, history_columns, read_history
 from flowborne.runs.run_folder import RunFolder, RunFolderError, reading
 from flowborne.runs.states import DYE, Arrays, StateArray, quantity, read_state
@@ -66,7 +67,7 @@ class OpenRun:
         return tuple(match[1] for match in found if match)
 
     @cached_property
-    def skin(self) -> NDArray[np.int64] | None:
+    def skin(self) -> Integers | None:
         """(m, 3) triangles of the `flesh_vertices` of a state, outward; None without flesh."""
         entry = self._model.get("flesh")
         return None if entry is None else np.asarray(entry["triangles"], np.int64)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from flowborne.base.atomic import sync_files, write_atomically, write_json
 from flowborne.coupling.world import Setup, World
-from flowborne.fluid.grid import Array
+from flowborne.kernels.arrays import Array, Integers
 from flowborne.runs.run_folder import RunFolder
 from flowborne.shapes.mesh import ShapeMesh
 from flowborne.solids.dynamics import Kinematics, kinematics
@@ -110,7 +110,7 @@ def centres(solid: SolidModel, pose: Kinematics) -> Array:
     return np.where(volume > 0.0, moment / np.where(volume > 0.0, volume, 1.0), pose.centroid)
 
 
-def on_skin(flesh: Flesh) -> NDArray[np.int64]:
+def on_skin(flesh: Flesh) -> Integers:
     """(k,) vertices of flesh on its surface, ascending."""
     return np.unique(flesh.surface)
 

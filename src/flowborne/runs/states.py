@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flowborne.base.given import check_file, read_arrays, said_of
-from flowborne.fluid.grid import Array, Grid
+from flowborne.fluid.grid import Grid
+from flowborne.kernels.arrays import Array, Real, Single
 from flowborne.runs.run_folder import RunFolder, RunFolderError
 
 IN_EVERY_STATE = "geom_position", "geom_rotation", "fluid_centre", "fluid_force"
@@ -21,7 +22,7 @@ IN_EVERY_STATE = "geom_position", "geom_rotation", "fluid_centre", "fluid_force"
 NUMBERS = "biuf"
 """Kinds of the NumPy types in a state."""
 
-Arrays = Mapping[str, NDArray[np.floating]]
+Arrays = Mapping[str, Real]
 
 
 class Quantity(NamedTuple):
@@ -163,7 +164,7 @@ def _unreadable(path: Path, error: Exception) -> RunFolderError:
     )
 
 
-def cell_velocity(grid: Grid, state: Arrays) -> NDArray[np.float32]:
+def cell_velocity(grid: Grid, state: Arrays) -> Single:
     """(nx, ny, nz, 3) mean of the faces, m/s; no z in a slab."""
     found = np.zeros((*grid.shape, 3), np.float32)
     for axis in grid.axes:

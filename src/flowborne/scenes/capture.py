@@ -8,7 +8,7 @@ from functools import lru_cache, partial
 import numpy as np
 
 from flowborne.base.errors import SceneError
-from flowborne.fluid.grid import Array
+from flowborne.kernels.arrays import Array
 from flowborne.motion.clip_following import Passage, trajectory_of_clip
 from flowborne.motion.clip_motion import TrajectoryClip
 from flowborne.motion.clip_reading import Capture, Reading, read_clip, with_held_joints

@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flowborne.base.phrases import listed
 from flowborne.coupling.cut import cut_at
 from flowborne.coupling.world import Setup
-from flowborne.fluid.grid import Array
+from flowborne.kernels.arrays import Array, Integers, Mask
 from flowborne.scenes.bodies import initial_state
 from flowborne.scenes.schema import Scene
 from flowborne.solids.dynamics import kinematics
@@ -80,18 +79,18 @@ def creature_of(scene: Scene, setup: Setup) -> Creature | None:
     )
 
 
-def counted_bodies(model: SolidModel) -> NDArray[np.bool_]:
+def counted_bodies(model: SolidModel) -> Mask:
     """(nbody + nodes,) bodies that move, all of them where none does, and nodes of flesh."""
     counted = model.moving if model.moving.any() else np.ones(model.nbody, bool)
     return np.append(counted, np.ones(len(model.body_mass) - model.nbody, bool))
 
 
-def unmet_bodies(model: SolidModel) -> NDArray[np.int64]:
+def unmet_bodies(model: SolidModel) -> Integers:
     """(k,) numbers of moving bodies that the fluid does not meet."""
     return np.flatnonzero(model.moving & ~model.met)
 
 
-def _displaced(setup: Setup, start: Array, counted: NDArray[np.bool_]) -> float | None:
+def _displaced(setup: Setup, start: Array, counted: Mask) -> float | None:
     """kg of fluid in place of the counted bodies and of flesh, in the cells nearest to them."""
     fluid = setup.fluid
     if fluid is None or fluid.one_way:

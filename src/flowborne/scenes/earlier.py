@@ -15,7 +15,7 @@ from flowborne.base.errors import SceneError
 from flowborne.base.given import read_arrays, read_json
 from flowborne.base.phrases import suggestion
 from flowborne.control.surroundings import Surroundings
-from flowborne.fluid.grid import Array
+from flowborne.kernels.arrays import Array
 from flowborne.motion.clip_curves import columns_of, row_of
 from flowborne.motion.clip_motion import TrajectoryClip
 from flowborne.motion.quaternions import continuous

@@ -13,9 +13,9 @@ from flowborne.control.surroundings import Surroundings
 from flowborne.coupling.cut import following
 from flowborne.coupling.world import Fluid
 from flowborne.fluid.boundary import Boundaries
-from flowborne.fluid.grid import Array, Grid
+from flowborne.fluid.grid import Grid
 from flowborne.fluid.window import crosses
-from flowborne.kernels.arrays import FREE
+from flowborne.kernels.arrays import FREE, Array
 from flowborne.motion.inflow import Bands, DyeBandsValue
 from flowborne.scenes.domain import Domain, check_memory
 from flowborne.scenes.draft import Draft, Key

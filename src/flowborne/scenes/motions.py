@@ -6,8 +6,6 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Literal, Self
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from flowborne.base.errors import SceneError
@@ -23,7 +21,7 @@ from flowborne.base.tables import (
     check_keyframes,
 )
 from flowborne.control.surroundings import Surroundings
-from flowborne.fluid.grid import Array
+from flowborne.kernels.arrays import Array, Integers
 from flowborne.motion.formula import RESERVED, Formula
 from flowborne.motion.tracks import (
     Curve,
@@ -34,8 +32,6 @@ from flowborne.motion.tracks import (
 )
 from flowborne.solids.model import HINGE, JOINT_KINDS, SLIDE, SolidModel, joint_kind, joint_unit
 from flowborne.solids.trajectories import ServoExact, ServoPD, Trajectory, driven
-
-Indices = NDArray[np.int64]
 
 
 class ServoExactTable(Table):
@@ -92,7 +88,7 @@ class DrivenTable(Table):
         """Whether the joint does not move."""
         return False
 
-    def _track(self, dofs: Indices, unit: float, constants: Mapping[str, float]) -> Trajectory:
+    def _track(self, dofs: Integers, unit: float, constants: Mapping[str, float]) -> Trajectory:
         raise NotImplementedError
 
 
@@ -111,7 +107,7 @@ class MotionConstantTable(DrivenTable):
     def rests(self) -> bool:
         return self.rate == 0.0
 
-    def _track(self, dofs: Indices, unit: float, constants: Mapping[str, float]) -> Trajectory:
+    def _track(self, dofs: Integers, unit: float, constants: Mapping[str, float]) -> Trajectory:
         return TrajectoryConstant(dofs, unit * self.position, unit * self.rate)
 
 
@@ -130,7 +126,7 @@ class MotionSinusoidTable(DrivenTable):
     mean: Number = 0.0
     phase: Number = 0.0
 
-    def _track(self, dofs: Indices, unit: float, constants: Mapping[str, float]) -> Trajectory:
+    def _track(self, dofs: Integers, unit: float, constants: Mapping[str, float]) -> Trajectory:
         phase = math.radians(self.phase)
         return TrajectorySinusoid(dofs, unit * self.amplitude, self.period, unit * self.mean, phase)
 
@@ -153,7 +149,7 @@ class MotionKeyframesTable(DrivenTable):
         check_keyframes(self.times, self.values, "values")
         return self
 
-    def _track(self, dofs: Indices, unit: float, constants: Mapping[str, float]) -> Trajectory:
+    def _track(self, dofs: Integers, unit: float, constants: Mapping[str, float]) -> Trajectory:
         return TrajectoryKeyframes(dofs, Curve(self.times, tuple(unit * v for v in self.values)))
 
 
@@ -168,7 +164,7 @@ class MotionFormulaTable(DrivenTable):
     kind: Literal["formula"]
     position: Text
 
-    def _track(self, dofs: Indices, unit: float, constants: Mapping[str, float]) -> Trajectory:
+    def _track(self, dofs: Integers, unit: float, constants: Mapping[str, float]) -> Trajectory:
         return TrajectoryFormula(dofs, Formula(self.position, constants), unit)
 
 

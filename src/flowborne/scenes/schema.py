@@ -7,7 +7,6 @@ from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 import tomli_w
-from numpy.typing import NDArray
 from pydantic import BeforeValidator, ConfigDict, Field, PrivateAttr, model_validator
 
 from flowborne.base.tables import (
@@ -23,6 +22,7 @@ from flowborne.base.tables import (
     Vector,
 )
 from flowborne.control.objective_kinds import AnyObjective
+from flowborne.kernels.arrays import Array
 from flowborne.runs.exporters import EXPORTERS, can_write, endings
 from flowborne.runs.run_folder import FIXED_NAMES
 from flowborne.scenes.changes import ChangeTable
@@ -217,7 +217,7 @@ class Scene(Table):
         """s between frames."""
         return 1.0 / self.time.frames_per_second
 
-    def frame_times(self) -> NDArray[np.float64]:
+    def frame_times(self) -> Array:
         """(frames + 1,) times of all frames and of the start, s."""
         return self.frame_time * np.arange(self.time.frames + 1, dtype=np.float64)
 

@@ -26,7 +26,7 @@ from flowborne.base.tables import (
     WholeNumber,
     check_interval,
 )
-from flowborne.fluid.grid import Array
+from flowborne.kernels.arrays import Array
 from flowborne.shapes.own import SHAPES, PlacedShape
 from flowborne.solids.displacing import Displace
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import Annotated, ClassVar, Literal
 
 from flowborne.base.tables import ByKind, Places, Table, Vector, triple
-from flowborne.fluid.grid import Array, Grid
+from flowborne.fluid.grid import Grid
 from flowborne.fluid.sides.far import (
     CHANNEL,
     ONE_SEA,
@@ -24,7 +24,7 @@ from flowborne.fluid.sides.kinds import (
     BoundaryPeriodic,
 )
 from flowborne.fluid.sides.side import Boundary
-from flowborne.kernels.arrays import FREE, PERIODIC
+from flowborne.kernels.arrays import FREE, PERIODIC, Array
 from flowborne.motion.inflow import InflowProfile
 from flowborne.scenes.domain import Domain
 from flowborne.scenes.factors import RampTable

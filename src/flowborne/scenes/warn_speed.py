@@ -11,8 +11,8 @@ import numpy as np
 from flowborne.base.tables import MOST_STEPS
 from flowborne.coupling.mouths import Mouth
 from flowborne.coupling.world import Setup
-from flowborne.fluid.grid import Array
 from flowborne.fluid.transport import EXTRAPOLATION_COURANT
+from flowborne.kernels.arrays import Array
 from flowborne.motion.tracks import SPEED_SAMPLES
 from flowborne.scenes.bodies import driven_dofs, initial_state
 from flowborne.scenes.schema import Scene

@@ -23,7 +23,7 @@ from flowborne.base.tables import (
 )
 from flowborne.control.surroundings import Surroundings, with_parameters
 from flowborne.coupling.stream import WindStream
-from flowborne.fluid.grid import Array
+from flowborne.kernels.arrays import Array
 from flowborne.motion.inflow import Factor, FactorSteady
 from flowborne.scenes.factors import FactorsTable
 from flowborne.solids.wind import Wind, WindFaces, WindForce

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
+from flowborne.kernels.arrays import Array, Integers, Mesh
 from flowborne.shapes.mesh import welded
-from flowborne.shapes.shape import Array, Integers, Mesh
 from flowborne.shapes.thickness import connected, outward
 
 SMALL_HOLE = 0.05

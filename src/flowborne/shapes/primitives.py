@@ -8,6 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from flowborne.kernels.arrays import Array, Mesh
 from flowborne.kernels.distance import BOX, CAPSULE, CYLINDER, ELLIPSOID, SPHERE
 from flowborne.shapes.mesh import ShapeMesh
 from flowborne.shapes.round import (
@@ -20,16 +21,7 @@ from flowborne.shapes.round import (
     swept_triangles,
 )
 from flowborne.shapes.section import Section, chord, upright_axis
-from flowborne.shapes.shape import (
-    AROUND,
-    DIRECTIONS,
-    ENDLESS,
-    FINENESS,
-    Array,
-    Mesh,
-    Primitive,
-    Shape,
-)
+from flowborne.shapes.shape import AROUND, DIRECTIONS, ENDLESS, FINENESS, Primitive, Shape
 from flowborne.shapes.thickness import thin_parts
 
 CORNERS = np.array(list(product((-1.0, 1.0), repeat=3)))

@@ -7,13 +7,10 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from flowborne.kernels.arrays import Array, Integers
+from flowborne.kernels.arrays import Array, Integers, Mesh
 from flowborne.kernels.distance import distances
 from flowborne.shapes.section import Section
 from flowborne.shapes.thickness import thin_parts
-
-Mesh = tuple[Array, Integers]
-"""Vertices (k, 3) and faces (m, 3), outward by the right-hand rule."""
 
 ENDLESS = 1e30
 """Half extent of a shape along an axis on which it has no ends, m."""

@@ -5,12 +5,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from flowborne.kernels.arrays import Array
+from flowborne.kernels.arrays import Array, Mask
 from flowborne.solids.dynamics import assemble
 from flowborne.solids.flesh_dynamics import assemble_flesh
 from flowborne.solids.flesh_solve import prescribe_flesh
 from flowborne.solids.model import SolidModel, SolidState
-from flowborne.solids.prescribed import Driven, Mask, prescribe
+from flowborne.solids.prescribed import Driven, prescribe
 
 LIMIT_TOLERANCE = 1e-9
 """Relative excess of a drive over its limit, or of a dof over its velocity, that is ignored."""

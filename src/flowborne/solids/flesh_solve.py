@@ -31,12 +31,12 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
 from scipy.sparse import coo_array, csc_array, csr_array
 
-from flowborne.kernels.arrays import Array, Integers
+from flowborne.kernels.arrays import Array, Integers, Mask
 from flowborne.solids.dynamics import Kinematics
 from flowborne.solids.flesh import Flesh
 from flowborne.solids.flesh_dynamics import FleshSystem
 from flowborne.solids.model import SolidModel
-from flowborne.solids.prescribed import Driven, Mask
+from flowborne.solids.prescribed import Driven
 from flowborne.solvers.cholesky import Cholesky, Ordering, cholesky, ordering_of
 from flowborne.solvers.mobility import Drag, Mobility, SparseAnswer, factored_mobility
 

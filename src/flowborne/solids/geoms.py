@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
-from flowborne.kernels.arrays import Array
+from flowborne.kernels.arrays import Array, Mesh
 from flowborne.shapes.own import OwnGeometry, PlacedShape, ShapeOwn, triangulated
 from flowborne.shapes.primitives import shape_of
-from flowborne.shapes.shape import Mesh, Shape
+from flowborne.shapes.shape import Shape
 
 Own = dict[str, OwnGeometry]
 """Name of a mesh of the model -> the user's geometry that it represents."""

@@ -12,8 +12,8 @@ from collections.abc import Iterable
 import mujoco
 import numpy as np
 
+from flowborne.kernels.arrays import Mesh
 from flowborne.shapes.closing import SMALL_HOLE, closed, hull, is_closed, open_edges
-from flowborne.shapes.shape import Mesh
 from flowborne.solids.geoms import element_name, floors, mesh_of, rotation_of
 
 MENDED = "(mended)"

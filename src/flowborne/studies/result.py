@@ -16,7 +16,7 @@ from flowborne.base.atomic import replaced_whole
 from flowborne.base.errors import SceneError
 from flowborne.base.extras import optional
 from flowborne.base.phrases import suggestion
-from flowborne.kernels.arrays import Array
+from flowborne.kernels.arrays import Array, Integers
 from flowborne.runs.history import unit_of
 from flowborne.studies.error_bars import Refinement
 from flowborne.studies.members import Ended, Members
@@ -81,7 +81,7 @@ class StudyResult:
         """Number of runs."""
         return len(self.columns["sample"])
 
-    def front(self) -> NDArray[np.int64]:
+    def front(self) -> Integers:
         """Rows of the Pareto front, of runs with the finest resolutions: no other one is as good in
         all goals and better in one. The best run if there is one goal.
 

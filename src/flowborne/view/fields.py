@@ -9,14 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from flowborne.fluid.grid import Array, Grid
+from flowborne.fluid.grid import Grid
+from flowborne.kernels.arrays import Array, Mask, Pixels, Real, Single
 from flowborne.runs.states import cell_vorticity, velocity_gradients
 from flowborne.view import style
 from flowborne.view.run import Run, State
 from flowborne.view.shot import Shot
-from flowborne.view.style import Pixels
 
-Single = NDArray[np.float32]
 Scale = tuple[Array, float, float, str]
 """Colours from lowest to highest (k, 3), lowest value, highest value, name."""
 Legend = Sequence[tuple[str, str]]
@@ -285,13 +284,11 @@ def _pressure(state: State) -> Array:
     return np.asarray(values - (known[np.isfinite(known)].mean() if known.size else 0.0))
 
 
-def _in_fluid(state: State) -> NDArray[np.bool_]:
+def _in_fluid(state: State) -> Mask:
     return np.asarray(state["open"] > 0.5)
 
 
-def _filled(
-    values: NDArray[np.floating], known: NDArray[np.bool_], layers: int = FILLED_LAYERS
-) -> Array:
+def _filled(values: Real, known: Mask, layers: int = FILLED_LAYERS) -> Array:
     """`values` (nx, ny) with unknown ones and NaNs replaced by the mean of their neighbours.
 
     This fills `layers` of cells, so that interpolation has no jump at a body's edge; the rest is 0.
@@ -335,7 +332,7 @@ def vorticity_limit(values: Sequence[Array]) -> float:
     return max(_level_of(sizes, STRONGER_CIRCULATION), 1e-12) if sizes.size else 1.0
 
 
-def full_strength(frames: Sequence[NDArray[np.floating]]) -> float:
+def full_strength(frames: Sequence[Real]) -> float:
     """Value at which a dye has its full colour: a percentile of its strong values, not the maximum,
     which is an overshoot of the advection at an edge."""
     values = np.concatenate([frame.ravel() for frame in frames])

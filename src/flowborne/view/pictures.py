@@ -15,9 +15,8 @@ from matplotlib.collections import PolyCollection
 from matplotlib.patches import Polygon
 from matplotlib.patheffects import withStroke
 from matplotlib.text import Text
-from numpy.typing import NDArray
 
-from flowborne.kernels.arrays import Array
+from flowborne.kernels.arrays import Array, Pixels
 from flowborne.view import style
 from flowborne.view.glyphs import SHAFT_WIDTH, flat_arrows, round_number
 from flowborne.view.layout import MARGIN, Box, Layout
@@ -103,7 +102,7 @@ class Picture:
         self._canvas.draw()
         self._still = self._canvas.copy_from_bbox(figure.bbox)
 
-    def draw(self, number: int) -> NDArray[np.uint8]:
+    def draw(self, number: int) -> Pixels:
         """(height, width, 4) picture of the `number`-th state, valid until the next call."""
         state = self.run.state(number)
         row = self.run.row(number)

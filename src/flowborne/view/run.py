@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from flowborne.kernels.arrays import Array
+from flowborne.kernels.arrays import Array, Integers
 from flowborne.runs.history import history_columns, read_history
 from flowborne.runs.open_run import OpenRun
 from flowborne.runs.run_folder import RunFolder, RunFolderError, reading
@@ -51,7 +51,7 @@ class Flesh:
     bodies     numbers of the bodies that carry flesh
     """
 
-    triangles: NDArray[np.int64]
+    triangles: Integers
     bodies: tuple[int, ...]
 
     rgb = style.rgb(style.FLESH)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flowborne.kernels.arrays import Array
 from flowborne.scenes.schema_film import FilmTable
 from flowborne.view import style
 
@@ -27,7 +27,7 @@ class Shot(FilmTable):
         """Colour of the background, "#rrggbb"; that of water if it is transparent or not given."""
         return style.WATER if self.background is None or self.transparent else self.background
 
-    def frames(self, times: NDArray[np.float64], run_rate: float) -> list[int]:
+    def frames(self, times: Array, run_rate: float) -> list[int]:
         """Numbers of the states that the frames of the film show, in order.
 
         A film with another rate than the run keeps its speed: each frame shows the nearest state.

@@ -5,11 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from flowborne.kernels.arrays import Array
-
-Pixels = NDArray[np.uint8]
+from flowborne.kernels.arrays import Array, Pixels, Real
 
 PAPER = "#0a121c"
 WATER = "#0e1b2b"
@@ -52,7 +49,7 @@ def rgb(colour: str) -> Array:
     return np.array([int(colour[n : n + 2], 16) / 255.0 for n in (1, 3, 5)])
 
 
-def to_bytes(colours: NDArray[np.floating]) -> Pixels:
+def to_bytes(colours: Real) -> Pixels:
     """Colours from 0 to 1 as bytes, of the same shape."""
     return np.rint(255.0 * colours).astype(np.uint8)
 

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from flowborne.kernels.arrays import Array, Integers, Marks
+from flowborne.kernels.arrays import Array, Integers, Marks, Mask
 from flowborne.kernels.control_volumes import CLOSED_BELOW
 
 
@@ -24,9 +23,7 @@ def neighbours_reference(shape: Integers, wraps: Integers) -> Integers:
     return np.stack(found)
 
 
-def largest_reference(
-    candidates: Integers, worth: Array, least: float
-) -> tuple[Integers, NDArray[np.bool_]]:
+def largest_reference(candidates: Integers, worth: Array, least: float) -> tuple[Integers, Mask]:
     """Of candidates (k, n) the first of largest worth (k, n), and whether that exceeds `least`."""
     best = worth.argmax(axis=0)[None]
     return np.take_along_axis(candidates, best, 0)[0], worth.max(axis=0) > least

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flowborne.fluid.grid import Array
+from flowborne.kernels.arrays import Array
 from flowborne.kernels.corner_friction import AROUND, BEHIND, BESIDE, BEYOND, NARROW, NEXT
 
 Known = tuple[float, float, float]

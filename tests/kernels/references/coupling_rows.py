@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from flowborne.kernels.arrays import PRESCRIBED, Array, Faces, Integers, Rows
+from flowborne.kernels.arrays import PRESCRIBED, Array, Faces, Integers, Kinds, Mask, Rows
 from flowborne.kernels.closed_fractions import Piece
-from flowborne.kernels.coupling_rows import COVERED, ENCLOSED, NARROW, WIDE, Kinds
+from flowborne.kernels.coupling_rows import COVERED, ENCLOSED, NARROW, WIDE
 
 
 def kinds_of_cells_reference(opened: Faces, normal: Integers) -> Kinds:
@@ -27,7 +26,7 @@ def kinds_of_cells_reference(opened: Faces, normal: Integers) -> Kinds:
     return kind
 
 
-def list_cells_reference(piece: Piece, listed: NDArray[np.bool_]) -> tuple[Integers, Array]:
+def list_cells_reference(piece: Piece, listed: Mask) -> tuple[Integers, Array]:
     """`list_cells` in NumPy: cells (n,) and values (n, 6)."""
     box, (origin, h, flat), share, centre = piece.box, piece.nodes, piece.share, piece.centre
     inside = tuple(slice(low, high - 1) for low, high in box)
@@ -61,7 +60,7 @@ def flesh_rows_reference(
     weight: Array,
     first_column: int,
     area: float,
-    listed: NDArray[np.bool_],
+    listed: Mask,
 ) -> tuple[Integers, Rows]:
     """`flesh_rows` in NumPy."""
     shape = np.array(listed.shape)

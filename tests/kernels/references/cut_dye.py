@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from flowborne.kernels.dye import CUT, EMPTY, WHOLE, Array, Integers, Marks
+from flowborne.kernels.arrays import Array, Integers
+from flowborne.kernels.dye import CUT, EMPTY, WHOLE, Marks
 
 from .control_volumes import neighbours_reference
 

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from flowborne.kernels.arrays import Array
+from flowborne.kernels.arrays import Array, Integers
 from flowborne.kernels.distance import CAPSULE, CYLINDER, ELLIPSOID, MESH, SPHERE
 
 
@@ -14,7 +13,7 @@ def signed_distance_reference(
     size: Array,
     points: Array,
     tables: Array,
-    table: NDArray[np.int64],
+    table: Integers,
     corner: Array,
     pitch: float,
 ) -> Array:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from flowborne.kernels.dye import ALIKE, TINY, Array
+from flowborne.kernels.arrays import Array
+from flowborne.kernels.dye import ALIKE, TINY
 
 
 def bend_reference(values: Array, clear: Array, least: float, most: float) -> tuple[Array, Array]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flowborne.kernels.arrays import Array
 from flowborne.kernels.elastic import STABLE_NEO_HOOKEAN
@@ -23,7 +22,7 @@ def stiffness_reference(
 ) -> Array:
     """(3k, 3k) stiffness of one element displaced by (k, 3) m, by differences of the stress, in
     NumPy; `gradients` (q, k, 3), `volumes` (q,), `moduli` (q, 2)."""
-    K: NDArray[np.float64] = np.zeros((u.size, u.size))
+    K: Array = np.zeros((u.size, u.size))
     eps = 1e-5
     for g, volume, (mu, lame) in zip(gradients, volumes, moduli, strict=True):
         F = np.eye(3) + u.T @ g

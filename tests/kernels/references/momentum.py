@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from flowborne.kernels.arrays import Array
+from flowborne.kernels.arrays import Array, Mask
 from flowborne.kernels.momentum import OF_THE_WHOLE, ROUNDING, Momenta
 
 
@@ -17,7 +16,7 @@ def about_origin_reference(vector: Array, moment: Array, centre: Array) -> Array
 def momentum_impulse_reference(
     twist: Array,
     momenta: Momenta,
-    conserved: NDArray[np.bool_],
+    conserved: Mask,
     gained: Array,
     still: Array,
     bias: Array,

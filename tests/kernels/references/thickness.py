@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from flowborne.kernels.arrays import Array, Integers
+from flowborne.kernels.arrays import Array, Integers, Mask
 
 from .triangles import closest_on_triangle_reference
 
 
 def any_within_reference(
     places: Array, radius: float, vertices: Array, triangles: Integers
-) -> NDArray[np.bool_]:
+) -> Mask:
     """`any_within` in NumPy, every place with every triangle."""
     corners, found = vertices[triangles], np.zeros(len(places), np.bool_)
     for n, p in enumerate(places):

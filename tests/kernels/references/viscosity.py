@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from flowborne.kernels.arrays import PERIODIC, PRESCRIBED, Array, Integers
+from flowborne.kernels.arrays import PERIODIC, PRESCRIBED, Array, Integers, Pixels
 from flowborne.kernels.viscosity import GIVEN, INACTIVE, LEAST, SAME, TIED, UNKNOWN
 
 from .cut_faces import closed_polygon_reference, open_edge_reference
@@ -21,9 +20,7 @@ def face_distances_reference(distance: Array, axis: int) -> Array:
     return np.moveaxis(mean, 0, axis)
 
 
-def classify_reference(
-    opened: Array, axis: int, normal: Integers, touching: float
-) -> NDArray[np.uint8]:
+def classify_reference(opened: Array, axis: int, normal: Integers, touching: float) -> Pixels:
     """`classify` in NumPy: the kinds."""
     kind = np.where(opened <= touching, TIED, UNKNOWN).astype(np.uint8)
     ends = np.moveaxis(kind, axis, 0)
@@ -75,7 +72,7 @@ def links_reference(
 def link_faces_reference(
     axis: int,
     d: int,
-    kind: NDArray[np.uint8],
+    kind: Pixels,
     distance: Array,
     opened: Array,
     centre: Array,
@@ -116,7 +113,7 @@ def beside_reference(values: Array, d: int, side: int, periodic: bool, missing: 
 
 def meet_walls_reference(
     axis: int,
-    kind: NDArray[np.uint8],
+    kind: Pixels,
     distance: Array,
     opened: Array,
     centre: Array,

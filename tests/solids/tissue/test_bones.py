@@ -5,12 +5,9 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from flowborne.shapes.closing import is_closed
 from flowborne.solids.tissue.bones import bones_of, contour
-
-Array = NDArray[np.float64]
 
 MODEL = """<mujoco><asset><mesh name="die" vertex="-.1 -.1 -.1 .1 -.1 -.1 -.1 .1 -.1 .1 .1 -.1
 -.1 -.1 .1 .1 -.1 .1 -.1 .1 .1 .1 .1 .1"/></asset><worldbody>

@@ -10,11 +10,10 @@ import pytest
 import pyvista as pv
 from scipy.sparse.linalg import splu
 
-from flowborne.kernels.arrays import Array
+from flowborne.kernels.arrays import Array, Mesh
 from flowborne.scenes.bodies import load_model
 from flowborne.scenes.load import load_scene
 from flowborne.shapes.closing import is_closed
-from flowborne.shapes.shape import Mesh
 from flowborne.sim.simulation import Simulation
 from flowborne.solids.elements import measures, outer_surface
 from flowborne.solids.model import SolidModel

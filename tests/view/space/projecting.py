@@ -1,11 +1,9 @@
 """Where a camera shows a point."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flowborne.kernels.arrays import Array
 from flowborne.view.space.camera import Camera
-
-Array = NDArray[np.float64]
 
 
 def project(camera: Camera, number: int, points: Array) -> Array:

@@ -13,6 +13,7 @@ import pytest
 
 import flowborne
 from flowborne.fluid.grid import Grid
+from flowborne.kernels.arrays import Pixels
 from flowborne.scenes.schema_film import CameraTable
 from flowborne.sim.running import RunOutcome
 from flowborne.view import style
@@ -26,7 +27,6 @@ from flowborne.view.space.surroundings import stands_on_ground
 from .projecting import project
 
 Make = Callable[..., Run]
-Pixels = np.ndarray
 
 BALL = ("sphere", (0.15, 0.0, 0.0))
 PAIR = np.array([[0.0, 0.0, 0.0], [1.0, 0.3, 0.6]])

@@ -17,6 +17,7 @@ from flowborne.coupling.report import Outcome
 from flowborne.coupling.step import step
 from flowborne.coupling.world import Fluid, Setup, World
 from flowborne.fluid.grid import Grid
+from flowborne.kernels.arrays import Pixels
 from flowborne.runs.history import History
 from flowborne.runs.recorder import Recorder, write_model
 from flowborne.runs.run_folder import RunFolder
@@ -39,7 +40,6 @@ from flowborne_validation.flesh_bars import bar_mesh
 from .projecting import project
 
 Make = Callable[..., Run]
-Pixels = np.ndarray
 
 BALL = ("sphere", (0.1, 0.0, 0.0))
 

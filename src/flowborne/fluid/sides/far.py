@@ -22,10 +22,10 @@ from typing import Protocol
 
 import numpy as np
 
-from flowborne.fluid.grid import Array, Grid
+from flowborne.fluid.grid import Grid
 from flowborne.fluid.sides.kinds import BoundaryOpen
 from flowborne.fluid.sides.side import Boundary, Pair, Place
-from flowborne.kernels.arrays import FREE, PRESCRIBED
+from flowborne.kernels.arrays import FREE, PRESCRIBED, Array
 
 Centre = tuple[float | None, float | None, float | None]
 """Along each axis the part of the way from the lower to the upper side; None along one on which the

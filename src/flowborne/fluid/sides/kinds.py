@@ -6,9 +6,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from flowborne.fluid.grid import Array
 from flowborne.fluid.sides.side import Boundary, Place, Profile, ScalarProfile
-from flowborne.kernels.arrays import FREE, PERIODIC, PRESCRIBED
+from flowborne.kernels.arrays import FREE, PERIODIC, PRESCRIBED, Array
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from flowborne.fluid.grid import Array, Grid
-from flowborne.kernels.arrays import FREE, PERIODIC, PRESCRIBED
+from flowborne.fluid.grid import Grid
+from flowborne.kernels.arrays import FREE, PERIODIC, PRESCRIBED, Array
 
 Profile = Callable[[Array, Array, Array, float], tuple[Array, Array, Array]]
 """velocity(x, y, z, time) -> (u, v, w): broadcasting arrays in m and s to m/s."""

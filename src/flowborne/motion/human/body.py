@@ -9,9 +9,10 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import ArrayLike
 
+from flowborne.kernels.arrays import Array
 from flowborne.motion.human.segments import Inertia, Sex, inertias
 from flowborne.motion.human.shapes import Shape, shapes
-from flowborne.motion.human.skeleton import BODIES, JOINT_OF, SIDES, Array, Skeleton
+from flowborne.motion.human.skeleton import BODIES, JOINT_OF, SIDES, Skeleton
 
 ELBOWS = tuple(f"{side}_elbow" for side in SIDES)
 

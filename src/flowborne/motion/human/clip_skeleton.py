@@ -8,6 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from flowborne.base.errors import SceneError
+from flowborne.kernels.arrays import Array
 from flowborne.motion.clip import Clip
 from flowborne.motion.human.skeleton import (
     FOREARM,
@@ -16,7 +17,6 @@ from flowborne.motion.human.skeleton import (
     PARENTS,
     SIDES,
     TIPS,
-    Array,
     Link,
     Skeleton,
     ancestors,

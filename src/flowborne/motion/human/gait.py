@@ -6,8 +6,9 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
+from flowborne.kernels.arrays import Array
 from flowborne.motion.clip import Clip
-from flowborne.motion.human.skeleton import JOINTS, PARENTS, SIDES, TIPS, Array, Skeleton
+from flowborne.motion.human.skeleton import JOINTS, PARENTS, SIDES, TIPS, Skeleton
 
 # fmt: off
 ROWS = np.array(

@@ -13,8 +13,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from flowborne.base.errors import SceneError
+from flowborne.kernels.arrays import Array
 from flowborne.motion.clip import Clip
-from flowborne.motion.human.skeleton import SIDES, Array, standard_skeleton
+from flowborne.motion.human.skeleton import SIDES, standard_skeleton
 from flowborne.motion.quaternions import angle, inverse, product, rotated
 from flowborne.shapes.shape import unit
 

@@ -7,7 +7,8 @@ from typing import Literal
 
 import numpy as np
 
-from flowborne.motion.human.skeleton import SIDES, Array, Skeleton
+from flowborne.kernels.arrays import Array
+from flowborne.motion.human.skeleton import SIDES, Skeleton
 
 Sex = Literal["male", "female"]
 

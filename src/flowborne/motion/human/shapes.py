@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from flowborne.kernels.arrays import Array
 from flowborne.motion.human.segments import axes_of
-from flowborne.motion.human.skeleton import Array, Skeleton
+from flowborne.motion.human.skeleton import Skeleton
 
 SKIN, SHIRT, TROUSERS, SHOES = (
     (0.85, 0.66, 0.53, 1.0),

@@ -7,12 +7,12 @@ from dataclasses import replace
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flowborne.kernels.arrays import Array, Mask
 from flowborne.motion.clip import Clip
 from flowborne.motion.human.segments import Sex, inertias
 from flowborne.motion.human.shapes import Shape, shapes
-from flowborne.motion.human.skeleton import JOINT_OF, SIDES, Array, Skeleton, nearest_parent
+from flowborne.motion.human.skeleton import JOINT_OF, SIDES, Skeleton, nearest_parent
 from flowborne.motion.quaternions import rotated
 
 STANDING_SPEED = 0.3
@@ -82,7 +82,7 @@ def _lowest(
     return np.asarray(points[np.arange(clip.frames), points[..., 2].argmin(axis=1)])
 
 
-def _stands(point: Array, frame_time: float) -> NDArray[np.bool_]:
+def _stands(point: Array, frame_time: float) -> Mask:
     """(frames,) whether the lowest point (frames, 3) of a foot is at rest."""
     apart = max(1, round(0.5 * SPEED_INTERVAL / frame_time))
     if len(point) <= 2 * apart:

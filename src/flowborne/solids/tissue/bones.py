@@ -11,10 +11,10 @@ import numpy as np
 
 from flowborne.base.extras import flesh_library
 from flowborne.base.phrases import suggestion
-from flowborne.kernels.arrays import Array
+from flowborne.kernels.arrays import Array, Mesh
 from flowborne.shapes.mesh import ShapeMesh
 from flowborne.shapes.own import level_surface
-from flowborne.shapes.shape import Mesh, Shape
+from flowborne.shapes.shape import Shape
 from flowborne.solids.geoms import box_of, displacing_geoms, element_name, geom_shape, rest_poses
 from flowborne.solids.mjcf import compiled_quietly
 

@@ -13,9 +13,8 @@ from numpy.polynomial import Polynomial
 
 from flowborne.base.extras import check_mesher
 from flowborne.base.phrases import location, rounded_up
-from flowborne.kernels.arrays import Array, Integers
+from flowborne.kernels.arrays import Array, Integers, Mesh
 from flowborne.kernels.jit import numba_thread_count
-from flowborne.shapes.shape import Mesh
 from flowborne.shapes.thickness import connected
 from flowborne.solids.elements import measures, oriented, outer_surface, with_middles
 from flowborne.solids.tissue.bones import (

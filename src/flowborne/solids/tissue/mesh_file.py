@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from flowborne.base.extras import optional
 from flowborne.base.given import read_arrays, read_file
+from flowborne.kernels.arrays import Integers
 from flowborne.solids.tissue.mesh import FleshMesh
 from flowborne.solids.tissue.mesh_run import READ, run_apart
 
@@ -108,7 +109,7 @@ def _no_mesh(path: Path, why: object) -> ValueError:
     )
 
 
-def _elements(found: Mapping[str, NDArray[Any]]) -> NDArray[np.int64]:
+def _elements(found: Mapping[str, NDArray[Any]]) -> Integers:
     """(m, 4) the tetrahedra of a file, or (m, 3) its triangles if it has no tetrahedra."""
     for corners in (4, 3):
         elements = found.get(f"elements_{corners}", np.zeros((0, corners)))

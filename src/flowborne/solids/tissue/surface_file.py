@@ -13,7 +13,7 @@ from trimesh.exchange.load import mesh_formats
 from flowborne.base.extras import flesh_library
 from flowborne.base.given import read_file
 from flowborne.base.phrases import location
-from flowborne.shapes.shape import Mesh
+from flowborne.kernels.arrays import Mesh
 from flowborne.solids.tissue.bones import Bones, contour, signed_distance
 
 if TYPE_CHECKING:

@@ -12,8 +12,7 @@ from itertools import combinations
 import numpy as np
 
 from flowborne.base.extras import flesh_library
-from flowborne.kernels.arrays import Array, Integers, Mask
-from flowborne.shapes.shape import Mesh
+from flowborne.kernels.arrays import Array, Integers, Mask, Mesh
 from flowborne.shapes.thickness import connected
 from flowborne.solids.elements import surface_of
 from flowborne.solids.tissue.bones import Bones, signed_distance

@@ -6,14 +6,14 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 from PIL import Image
 from scipy.spatial.transform import Rotation
 
-from flowborne.fluid.grid import Array, Grid
+from flowborne.fluid.grid import Grid
+from flowborne.kernels.arrays import Array, Mesh, Pixels, Single
 from flowborne.runs.states import cell_velocity
 from flowborne.view import style
-from flowborne.view.browser.meshes import Mesh, nothing, repeated, show_mesh
+from flowborne.view.browser.meshes import nothing, repeated, show_mesh
 from flowborne.view.browser.settings import Settings
 from flowborne.view.fields import (
     Field,
@@ -31,7 +31,6 @@ from flowborne.view.run import Run, State
 from flowborne.view.shot import Shot
 from flowborne.view.space.fluid import vortex_surface
 from flowborne.view.space.lighting import scattered
-from flowborne.view.style import Pixels
 
 if TYPE_CHECKING:
     from viser import SceneApi
@@ -263,7 +262,7 @@ class Fluid:
 
 def cloud(
     grid: Grid, dye: FieldDye, state: State, toward: Array
-) -> tuple[Array, NDArray[np.float32], NDArray[np.float32], float]:
+) -> tuple[Array, Single, Single, float]:
     """Centres (n, 3) m, colours (n, 3) and opacities (n,) of the cells with dye, and their size, m.
 
     toward  (3,) to the camera, for scattered light
@@ -282,7 +281,7 @@ def cloud(
     return centres, np.clip(colour[at] * light[at], 0.0, 1.0), np.clip(opacity, 0.0, 1.0), size
 
 
-def _coarser(values: NDArray[np.float32]) -> NDArray[np.float32]:
+def _coarser(values: Single) -> Single:
     """Means over blocks of 2^3 cells; odd cells at the upper ends are dropped."""
     for axis in range(3):
         values = np.moveaxis(values, axis, 0)

@@ -8,13 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyvista as pv
 
-from flowborne.kernels.arrays import Array, Integers
+from flowborne.kernels.arrays import Array, Integers, Mesh
 
 if TYPE_CHECKING:
     from viser import MeshHandle, SceneApi
-
-Mesh = tuple[Array, Integers]
-"""Vertices (n, 3) m and triangles (m, 3) of them, outward."""
 
 
 def prism(outlines: Sequence[Array], low: float, high: float) -> Mesh:

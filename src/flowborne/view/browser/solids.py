@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from flowborne.kernels.arrays import Array
+from flowborne.kernels.arrays import Array, Mesh
 from flowborne.view import style
 from flowborne.view.browser.meshes import (
-    Mesh,
     add_mesh,
     counter_clockwise,
     nothing,

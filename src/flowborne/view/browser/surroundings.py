@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flowborne.fluid.grid import Array, Grid
+from flowborne.fluid.grid import Grid
+from flowborne.kernels.arrays import Array
 from flowborne.view import style
 from flowborne.view.browser.meshes import add_mesh, repeated
 from flowborne.view.browser.viewpoint import FilmView

@@ -4,20 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 import pyvista as pv
-from numpy.typing import NDArray
 from PIL import Image
 from scipy.ndimage import zoom
 from vtkmodules.vtkCommonDataModel import vtkPiecewiseFunction
 from vtkmodules.vtkRenderingCore import vtkVolume, vtkVolumeProperty
 from vtkmodules.vtkRenderingVolume import vtkGPUVolumeRayCastMapper
 
-from flowborne.fluid.grid import Array, Grid
+from flowborne.fluid.grid import Grid
+from flowborne.kernels.arrays import Array, Pixels, Single
 from flowborne.view import style
 from flowborne.view.fields import FieldDye, FieldNumber, FieldVortices
 from flowborne.view.run import State
 from flowborne.view.space.lighting import scattered
 from flowborne.view.space.surfaces import LIT
-from flowborne.view.style import Pixels
 
 SMOKE_DEPTH = 0.016
 """Depth of full smoke that transmits 1/e of the light, in heights of the picture, or in sides of a
@@ -88,7 +87,7 @@ class Smoke:
             self._added = True
 
 
-def _voxels(colour: NDArray[np.float32], share: NDArray[np.float32], finer: int) -> Pixels:
+def _voxels(colour: Single, share: Single, finer: int) -> Pixels:
     """Colours (nx, ny, nz, 3) and shares of full density (nx, ny, nz) as bytes (..., 4).
 
     The shares are interpolated by cubics before they are sharpened to densities, so that edges

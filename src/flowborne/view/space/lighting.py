@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from flowborne.kernels.arrays import Array
+from flowborne.kernels.arrays import Array, Single
 from flowborne.view import style
-
-Single = NDArray[np.float32]
 
 KEY = (0.1, 0.75, -1.25)
 """Direction of the strongest light and of the shadows."""

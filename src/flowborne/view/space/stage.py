@@ -9,7 +9,8 @@ import pyvista as pv
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 
-from flowborne.fluid.grid import Array, Grid
+from flowborne.fluid.grid import Grid
+from flowborne.kernels.arrays import Array, Pixels
 from flowborne.view import style
 from flowborne.view.fields import FieldDye, FieldNumber, FieldVortices, Legend, Scale, field_of
 from flowborne.view.framing import through_window, window_path
@@ -31,7 +32,6 @@ from flowborne.view.space.surfaces import (
     mesh_of,
 )
 from flowborne.view.space.surroundings import Ground, Motes, stands_on_ground, water_of
-from flowborne.view.style import Pixels
 
 
 class MapSpace:

@@ -7,17 +7,14 @@ from typing import Any
 
 import numpy as np
 import pyvista as pv
-from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from flowborne.kernels.arrays import Array
+from flowborne.kernels.arrays import Array, Integers
 from flowborne.shapes.shape import unit
 from flowborne.view import style
 from flowborne.view.glyphs import Forces
 from flowborne.view.run import Geom, Skin, State
-
-Indices = NDArray[np.int64]
 
 SHARP = 35.0
 """Angle between two faces above which their edge is sharp, degrees."""
@@ -45,7 +42,7 @@ def mesh_of(geom: Geom) -> pv.PolyData:
     )
 
 
-def colour_of(geom: Geom, accented: frozenset[int]) -> tuple[NDArray[np.float64], float]:
+def colour_of(geom: Geom, accented: frozenset[int]) -> tuple[Array, float]:
     """(3,) colour of a geometry and its opacity, from 0 to 1.
 
     The colour is the model's unless the geometry is fixed, accented or has none.
@@ -89,7 +86,7 @@ class SkinSurface:
         return np.asarray(vertices[self._skin.triangles])
 
 
-def creased(vertices: Array, triangles: Indices) -> tuple[Indices, Indices]:
+def creased(vertices: Array, triangles: Integers) -> tuple[Integers, Integers]:
     """The vertex (n,) of each point of a surface, and its triangles (m, 3) of points.
 
     A vertex on a crease has a point, and so a normal, on each side of it.
@@ -116,7 +113,7 @@ def creased(vertices: Array, triangles: Indices) -> tuple[Indices, Indices]:
     return vertex, point.reshape(-1, 3).astype(np.int64)
 
 
-def normals(points: Array, triangles: Indices) -> Array:
+def normals(points: Array, triangles: Integers) -> Array:
     """(n, 3) area-weighted mean normal of the triangles (m, 3) around each point."""
     total = np.zeros((len(points), 3))
     np.add.at(total, triangles, _area_normals(points[triangles])[:, None])

@@ -7,11 +7,10 @@ from typing import Any
 
 import numpy as np
 import pyvista as pv
-from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFilter
 from scipy.spatial import ConvexHull, QhullError
 
-from flowborne.kernels.arrays import Array
+from flowborne.kernels.arrays import Array, Pixels
 from flowborne.view import style
 from flowborne.view.framing import swept
 from flowborne.view.glyphs import motes, round_number
@@ -95,7 +94,7 @@ class Ground:
         self._shadow.position = (*focus[:2], self._lift)
         self._shadow.texture = _texture(self._cast(focus[:2] - 0.5 * self._extent, bodies, skin))
 
-    def _cast(self, corner: Array, bodies: Sequence[Array], skin: Array) -> NDArray[np.uint8]:
+    def _cast(self, corner: Array, bodies: Sequence[Array], skin: Array) -> Pixels:
         """(SHADOW_PIXELS, SHADOW_PIXELS) shadow of bodies and skin, lowest row first."""
         image = Image.new("L", (SHADOW_PIXELS, SHADOW_PIXELS))
         draw = ImageDraw.Draw(image)
@@ -144,7 +143,7 @@ def _hull(points: Array) -> Array:
         return points[:0]
 
 
-def _texture(shade: NDArray[np.uint8]) -> pv.Texture:
+def _texture(shade: Pixels) -> pv.Texture:
     """Black with opacity `shade`, lowest row first."""
     pixels = np.zeros((*shade.shape, 4), np.uint8)
     pixels[..., 3] = SHADOW_OPACITY * shade[::-1]
