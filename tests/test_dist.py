@@ -85,7 +85,7 @@ def test_the_wheel_of_the_validation_holds_its_cases(validation: tuple[Path, Pat
     held = members(validation[1])
     described = {name for name in held if ".dist-info/" in name}
     packed = {f"flowborne_validation/{robot}/LICENSE" for robot in ("fishrobot", "rexeel")}
-    data = files(VALIDATION, ".json", ".gz")
+    data = files(VALIDATION, ".json", ".toml", ".gz")
     assert len(data) > 5
     assert held - described == files(VALIDATION, ".py") | data | packed
     assert licences(held) == {"LICENSE", *(f"src/{name}" for name in packed)}

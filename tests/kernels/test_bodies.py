@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from flowborne.kernels.momentum import Momenta, about_origin, momentum_impulse
+from flowborne.kernels.momentum import about_origin, momentum_impulse
 from flowborne.kernels.thickness import any_within, by_cells, way_inward
 from flowborne.kernels.triangles import crossings
 from flowborne.kernels.wind import places, pushed
@@ -45,7 +45,7 @@ def test_momentum_impulse(dofs: int) -> None:
     twist = random.normal(size=(dofs, 6))
     body, conserved = random.integers(5, size=dofs), random.uniform(size=dofs) < 0.5
     momenta, forces = random.normal(size=(2, 5, 6)), random.normal(size=(4, dofs))
-    given = twist, Momenta(*momenta, body), conserved, *forces, 0.2
+    given = twist, (*momenta, body), conserved, *forces, 0.2
     impulse, rounding = momentum_impulse(*given)
     expected, room = momentum_impulse_reference(*given)
     np.testing.assert_allclose(impulse, expected, rtol=1e-13, atol=1e-13)

@@ -219,3 +219,10 @@ def test_no_exemption_is_out_of_date() -> None:
 def test_modules_that_a_page_names_are_there(page: Path) -> None:
     paths = re.findall(r"`((?:src|tools|tests)/[\w./-]+)`", page.read_text(encoding="utf-8"))
     assert not [path for path in paths if not (ROOT / path).exists()]
+
+
+def test_modules_name_every_page_of_the_method() -> None:
+    pages = {path.relative_to(ROOT).as_posix() for path in (ROOT / "docs" / "method").glob("*.md")}
+    text = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "src").rglob("*.py"))
+    named = set(re.findall(r"^Method: (\S+\.md)\.$", text, re.MULTILINE))
+    assert named == pages - {"docs/method/index.md"}

@@ -1,6 +1,8 @@
 """The controller chooses targets for the controlled joints, and drives the joints towards them.
 
 Paper: sections 2.1 and 4.3 (algorithm).
+
+Method: docs/method/control.md.
 """
 
 from __future__ import annotations

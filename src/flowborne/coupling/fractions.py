@@ -1,4 +1,7 @@
-"""Where bodies close the faces of the grid, and what pressure in each cell does to them."""
+"""Where bodies close the faces of the grid, and what pressure in each cell does to them.
+
+Method: docs/method/cut-cells.md.
+"""
 
 from __future__ import annotations
 

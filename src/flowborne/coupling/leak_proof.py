@@ -16,6 +16,8 @@ holds at last comes from that behind.
 
 A closed region of fluid keeps its volume, but that of the cells around a moving body wavers a
 little on any grid: there all volumes at the end are scaled alike, by 1e-5 to 1e-3.
+
+Method: docs/method/leak-proof.md.
 """
 
 from __future__ import annotations

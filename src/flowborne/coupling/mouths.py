@@ -10,6 +10,8 @@ relative to the body, along its direction d. With the body's velocity v_b at the
 What body and fluid gain together, rho Q dt v_b, is the momentum of what a body of constant mass is
 filled with. All of it holds for a mouth that takes fluid in (Q < 0) as well. Sources bring fluid
 in from within as mouths do.
+
+Method: docs/method/mouths.md.
 """
 
 from __future__ import annotations

@@ -12,6 +12,8 @@ more than its torque limit, or moves the bodies otherwise than their Coriolis fo
 the system is solved again with that changed: the first time only roughly where that is to be
 expected, to the full tolerance in the end. Viscosity is solved again for new contacts only: what
 the others change is small in dt.
+
+Method: docs/method/coupled-solve.md.
 """
 
 from __future__ import annotations

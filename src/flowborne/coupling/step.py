@@ -22,6 +22,8 @@ Deviations from the paper, and their reasons:
        swimmer exchanges with it.
     6  Viscosity is solved for first, with friction at bodies and the last pressure
        (`viscous_solve`).
+
+Method: docs/method/step.md.
 """
 
 from __future__ import annotations

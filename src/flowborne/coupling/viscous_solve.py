@@ -13,6 +13,8 @@ are eliminated exactly,
 
 and what is left for u is symmetric positive definite, with a term of low rank (Robinson-Mosher,
 Schroeder and Fedkiw 2011 do the same).
+
+Method: docs/method/viscosity.md.
 """
 
 from __future__ import annotations

@@ -17,6 +17,8 @@ difference. That makes eddies of two cells beside bodies that the fluid slips al
 third order damp, but the means near cut faces do not. There the circulation around the edges of the
 grid evens out as fast (`kernels.eddies`). Viscous fluid has none of it: it would act on boundary
 layers.
+
+Method: docs/method/fluid.md.
 """
 
 from __future__ import annotations

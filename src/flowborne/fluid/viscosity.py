@@ -21,6 +21,8 @@ That friction belongs to the stress mu grad u. What mu (grad u)^T adds sums up t
 body that the fluid does not feel: on a no-slip wall the whole stress is mu times the normal
 derivative of the velocity relative to the body, its rotation taken off, or  W (u_f - b_f)  with
 the body's velocity at the face. A body of volume V and spin w feels  -2 mu V w  besides.
+
+Method: docs/method/viscosity.md.
 """
 
 from __future__ import annotations

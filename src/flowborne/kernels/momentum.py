@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numba import njit
 
@@ -31,16 +29,9 @@ ROUNDING, OF_THE_WHOLE = 1e-14, 1e-15
 hand's forces are sums in which those of the whole creature cancel."""
 
 
-class Momenta(NamedTuple):
-    """Momenta about the world origin, N s, N m s.
-
-    given, later  (bodies, 6) of the subtree of each body, P and P+
-    body          (nv,) their rows for each dof
-    """
-
-    given: Array
-    later: Array
-    body: Integers
+Momenta = tuple[Array, Array, Integers]
+"""(bodies, 6) of the subtree of each body, P and P+, about the world origin, N s and N m s; (nv,)
+their rows for each dof."""
 
 
 @njit(nogil=True, cache=True)

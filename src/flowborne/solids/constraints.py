@@ -1,4 +1,7 @@
-"""Constraint rows of a step: equalities, dry friction, limits and contacts."""
+"""Constraint rows of a step: equalities, dry friction, limits and contacts.
+
+Method: docs/method/contact.md.
+"""
 
 from __future__ import annotations
 

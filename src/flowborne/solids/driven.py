@@ -1,5 +1,8 @@
 """The bodies of a step with driven dofs: a dense system of bones alone (`prescribed`), or a sparse
-one of bones and flesh (`flesh_solve`)."""
+one of bones and flesh (`flesh_solve`).
+
+Method: docs/method/bodies.md.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Kinematics, and the linear system A (v+ - v) = dt b of the bodies, assembled by MuJoCo."""
+"""Kinematics, and the linear system A (v+ - v) = dt b of the bodies, assembled by MuJoCo.
+
+Method: docs/method/bodies.md.
+"""
 
 from __future__ import annotations
 

@@ -2,6 +2,8 @@
 
 The skin is made of vertices. In three dimensions they are the nodes; in a slab each node in the
 plane z = 0 has one vertex at either end of a prism of unit depth.
+
+Method: docs/method/flesh.md.
 """
 
 from __future__ import annotations

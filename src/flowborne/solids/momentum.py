@@ -7,7 +7,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from flowborne.kernels.arrays import Array
-from flowborne.kernels.momentum import Momenta, about_origin, momentum_impulse
+from flowborne.kernels.momentum import about_origin, momentum_impulse
 from flowborne.solids.model import SolidModel, SolidState
 from flowborne.solids.scratch import Scratch, posed, scratch, twists_about_origin
 
@@ -149,7 +149,7 @@ class Halfway:
         gained = self._mass @ (v_plus - v) - model.armature * (v_plus - v)
         return momentum_impulse(
             self._twist,
-            Momenta(self._given, later, model.dof_body),
+            (self._given, later, model.dof_body),
             model.conserved,
             gained,
             self._still,

@@ -17,6 +17,8 @@ weigh little against K are left out.
 
 In a region without an open side K knows the unknown only up to a constant. A sum of such constants,
 c_r in region r, is a null vector when A^-1 is 0 on the load  J^T (sum of c_r 1_r).
+
+Method: docs/method/coupled-solve.md.
 """
 
 from __future__ import annotations
