@@ -118,7 +118,7 @@ def find_targets(
     A face that is wholly closed has a control volume where a cell beside it is open in part. What
     lies there goes along with the opposite faces of both cells, in proportion to their open parts
     and to those of the cells; where the opposite face of the larger cell is closed, or ends the
-    domain, with the neighbour that has the largest volume, so that nothing passes through the body;
+    domain, with the largest neighbour across the other axes, so that nothing passes through a body;
     else with the targets of a neighbour, which may have them from another.
 
     small    (n,) closed faces with a volume
@@ -164,7 +164,7 @@ def find_targets(
             continue
         most = 0.0
         for way in range(6):
-            to = neighbour(shape, wraps, f, way)
+            to = -1 if way // 2 == component else neighbour(shape, wraps, f, way)
             if to >= 0 and pushed[to] & DRIVEN and volume_flat[to] > most:
                 targets[n, 0], parts[n, 0], most = to, 1.0, volume_flat[to]
                 targets[n, 1], parts[n, 1] = f, 0.0
