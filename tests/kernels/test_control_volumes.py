@@ -152,9 +152,9 @@ def test_what_has_no_way_ahead_goes_with_what_is_beside_it() -> None:
     opened[:, 0, 0] = 0.0, 0.0, 0.0, 0.7, 1.0
     volumes[:, 0, 0] = 0.0, 0.3, 0.4, 0.6, 1.0
     cells[1:3, 1], opened[2, 1], volumes[2, 1] = 1.0, 0.4, 0.5
-    pushed, none = (opened > 0.0).astype(np.uint8), np.zeros(3, np.int64)
-    closed = np.array([2 * 2])
-    targets, parts = find_targets(closed, pushed, opened, volumes, cells, 0, none)
+    faces = FaceGrid(0, np.array(opened.shape), np.zeros(3, np.int64))
+    pushed, closed = (opened > 0.0).astype(np.uint8), np.array([2 * 2])
+    targets, parts = find_targets(closed, pushed, opened, volumes, cells, faces)
     (joined,) = targets[parts > 0.0]
     assert joined == 2 * 2 + 1
 
