@@ -15,7 +15,7 @@ from flowborne.coupling.images import Images, displaced, periods
 from flowborne.coupling.overlaps import handed_on
 from flowborne.coupling.shapes import Shapes
 from flowborne.fluid.boundary import Boundaries
-from flowborne.fluid.ghosts import edge
+from flowborne.fluid.ghosts import edge, planes
 from flowborne.fluid.grid import Grid
 from flowborne.kernels.arrays import PRESCRIBED, Array, Faces, Integers, Mask, Rows
 from flowborne.kernels.closed_fractions import (
@@ -242,7 +242,8 @@ def geometry(
     for d in around:
         join_ends(opened[d], d)
     axis, face, part_body, closed, centre = map(np.concatenate, zip(*listed, strict=True))
-    kind = kinds_of_cells(ox, oy, oz, normal)
+    across = np.roll(normal, int(flat), axis=0)
+    kind = kinds_of_cells(*planes((ox, oy, oz), grid), across).reshape(grid.shape)
     with_rows = kind >= NARROW
     bones = [piece for piece in pieces if piece.body < first_skin]
     middles = np.concatenate([boxes.mean(axis=1), skins.middle])

@@ -37,6 +37,7 @@ from flowborne.coupling.operators import (
 from flowborne.coupling.report import Outcome, timed
 from flowborne.coupling.viscous_solve import diffuse
 from flowborne.coupling.world import Fluid, World
+from flowborne.fluid.ghosts import plane, planes
 from flowborne.fluid.grid import Grid, faces_of
 from flowborne.fluid.projection import face_weights, pressure_gradient
 from flowborne.kernels.arrays import ROUNDING, Array, Faces, Integers
@@ -299,9 +300,10 @@ def net_outflow(velocity: Faces, cut: Geometry, rate: Array, fluid: Fluid) -> Ar
 
     rate  (nx, ny, nz) volume that sources and mouths bring into each cell, m^3/s
     """
-    net = np.empty(fluid.grid.shape)
-    net_out(net, *(part * u for part, u in zip(cut.open, velocity, strict=True)))
-    net *= fluid.grid.face_area
+    grid, net = fluid.grid, np.empty(fluid.grid.shape)
+    through = faces_of([part * u for part, u in zip(cut.open, velocity, strict=True)])
+    net_out(plane(net, grid), *planes(through, grid))
+    net *= grid.face_area
     net -= rate
     return net
 

@@ -18,6 +18,7 @@ import numpy as np
 
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.dipoles import Dipoles
+from flowborne.fluid.ghosts import plane
 from flowborne.fluid.grid import Grid, faces_of
 from flowborne.kernels.arrays import Array, Faces
 from flowborne.kernels.faces import accelerate
@@ -64,10 +65,11 @@ class PressureGradient:
     def subtract(self, velocity: Faces, pressure: Array, scale: float) -> None:
         """Subtract scale rate (p_upper - p_lower) on every face, in place; see
         `subtract_gradient`."""
-        periodic = self.boundaries.periodic()
-        for axis in self.grid.axes:
-            rate = self.rate[axis]
-            subtract_gradient(velocity[axis], rate, pressure, axis, scale, periodic[axis])
+        grid, periodic = self.grid, self.boundaries.periodic()
+        p = plane(pressure, grid)
+        for axis in grid.axes:
+            u, rate = plane(velocity[axis], grid), plane(self.rate[axis], grid)
+            subtract_gradient(u, rate, p, axis + grid.is_slab, scale, periodic[axis])
         for place, answer in self.dipoles.answer(pressure) if self.dipoles else ():
             change = scale * self.whole * answer
             velocity[place.axis][place.layer] += change if place.upper else -change

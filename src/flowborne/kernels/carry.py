@@ -20,6 +20,7 @@ from flowborne.kernels.control_volumes import (
     join_small,
     level,
     mark_cut,
+    place_in,
     share_velocity,
 )
 from flowborne.kernels.face_masses import add_transfers, give, place_of
@@ -194,23 +195,25 @@ def mark_volumes(marks: Marks, cut: Integers, sides: Sides, faces: FaceGrid) -> 
 def side_rates(flux: Fluxes, index: Integers, shape: Integers) -> Array:
     """(n, 6) volume per time that leaves control volumes through their sides: 2 axis for the lower
     one, 2 axis + 1 for the upper one."""
-    rate, at, side = np.zeros((index.size, 6)), np.empty(3, np.int64), np.empty(3, np.int64)
-    component = flux.component
-    for n in range(index.size):
-        f = index[n]
-        at[0], at[1], at[2] = f // (shape[1] * shape[2]), (f // shape[2]) % shape[1], f % shape[2]
-        for axis in range(3):
-            if shape[axis] == 1:
-                continue
-            q, own = across_axis(flux.through, axis), int(axis == component)
+    rate, component = np.zeros((index.size, 6)), flux.component
+    for axis in range(3):
+        if shape[axis] == 1:
+            continue
+        q, own = across_axis(flux.through, axis), int(axis == component)
+        steps, through = (q.shape[1] * q.shape[2], q.shape[2], 1), q.reshape(-1)
+        step = steps[component]
+        for n in range(index.size):
+            i, j, k = place_in(index[n], shape)
+            line = (i, j, k)[component]
+            first = i * steps[0] + j * steps[1] + k - line * step
             for upper in range(2):
-                side[:] = at
-                side[axis] += upper
-                line = side[component]
+                side, row = line + upper * own, first + upper * (1 - own) * steps[axis]
                 for one in range(2):
-                    side[component] = flux.place[own, line, one]
-                    through = flux.share[own, line, one] * q[side[0], side[1], side[2]]
-                    rate[n, 2 * axis + upper] += (2 * upper - 1) * through
+                    part = (
+                        flux.share[own, side, one]
+                        * through[row + step * flux.place[own, side, one]]
+                    )
+                    rate[n, 2 * axis + upper] += (2 * upper - 1) * part
     return rate
 
 
@@ -421,11 +424,11 @@ def pass_inlets(now: Stage, padded: Array, inlets: Inlets, own: Array) -> None:
 
     own  (n,) on return what leaves at each with the fluid's own velocity, per time
     """
-    flat, shape = in_line(now), now.later.shape
+    flat = in_line(now)
     for n in range(own.size):
         f = inlets.faces[n]
-        i, j, k = f // (shape[1] * shape[2]), (f // shape[2]) % shape[1], f % shape[2]
-        i += (padded.shape[0] - shape[0]) // 2
+        i, j, k = place_in(f, now.later.shape)
+        i += (padded.shape[0] - now.later.shape[0]) // 2
         own[n] = inlets.loss[n] * padded[i, j + GHOSTS, k + GHOSTS]
         give(flat, f, own[n] - inlets.gain[n] * inlets.velocity[n])
 

@@ -59,29 +59,50 @@ def across_axis(faces: Faces, axis: int) -> Array:
     return faces[1] if axis == 1 else faces[2]
 
 
-@njit(nogil=True, cache=True)
-def neighbour(shape: Integers, wraps: Integers, f: int, way: int) -> int:
-    """Flat index of the control volume beside f; -1 beyond the domain, and along an axis of one
-    layer.
+@inlined
+def place_in(f: int, shape: Integers) -> tuple[int, int, int]:
+    """Indices of a flat one: two divisions of 32 bits."""
+    row = np.int64(np.uint32(f) // np.uint32(shape[2]))
+    i = np.int64(np.uint32(row) // np.uint32(shape[1]))
+    return int(i), int(row - i * shape[1]), int(f - row * shape[2])
+
+
+@inlined
+def both_ways(f: int, at: int, step: int, count: int, period: int) -> tuple[int, int]:
+    """Flat indices of the control volumes below and above f along an axis.
+
+    at      its index along the axis, of `count`; `step` is between flat ones
+    period  number of distinct ones where the axis is periodic, else 0
+    """
+    if count == 1:
+        return -1, -1
+    low = f - step if at > 0 else (f + step * (period - 1) if period > 0 else -1)
+    if period > 0 and at + 1 >= period:
+        return low, f + step * (1 - period)
+    return low, f + step if at + 1 < count else -1
+
+
+@inlined
+def find_beside(found: Integers, f: int, shape: Integers, wraps: Integers) -> None:
+    """Set (6,) to the flat indices of the control volumes beside f: 2 axis below, 2 axis + 1 above;
+    -1 beyond the domain, and along an axis of one layer.
 
     wraps  (3,) number of distinct volumes along each periodic axis, else 0
-    way    2 axis below f, 2 axis + 1 above
     """
-    axis, side = way // 2, 2 * (way % 2) - 1
-    if shape[axis] == 1:
-        return -1
-    n1, n2 = shape[1], shape[2]
-    at = f // (n1 * n2) if axis == 0 else ((f // n2) % n1 if axis == 1 else f % n2)
-    step = n1 * n2 if axis == 0 else (n2 if axis == 1 else 1)
-    to = at + side
-    if wraps[axis] > 0:
-        if to < 0:
-            return int(f + step * (wraps[axis] - 1))
-        if to >= wraps[axis]:
-            return int(f - step * at + step * (to - wraps[axis]))
-    elif to < 0 or to >= shape[axis]:
-        return -1
-    return int(f + step * side)
+    i, j, k = place_in(f, shape)
+    found[0], found[1] = both_ways(f, i, shape[1] * shape[2], shape[0], wraps[0])
+    found[2], found[3] = both_ways(f, j, shape[2], shape[1], wraps[1])
+    found[4], found[5] = both_ways(f, k, 1, shape[2], wraps[2])
+
+
+@njit(nogil=True, cache=True)
+def neighbour(shape: Integers, wraps: Integers, f: int, way: int) -> int:
+    """That of `find_beside` along one way."""
+    axis, (i, j, k) = way // 2, place_in(f, shape)
+    at = i if axis == 0 else (j if axis == 1 else k)
+    step = shape[1] * shape[2] if axis == 0 else (shape[2] if axis == 1 else 1)
+    low, high = both_ways(f, at, step, shape[axis], wraps[axis])
+    return int(high if way % 2 else low)
 
 
 @njit(nogil=True, cache=True)
@@ -123,13 +144,14 @@ def find_targets(
     """
     targets, parts = np.empty((small.size, 2), np.int64), np.zeros((small.size, 2))
     (component, shape, wraps), cell_shape = faces, np.array(cells.shape)
+    near = np.empty(6, np.int64)
     volume_flat = volumes.reshape(-1)
     open_flat, cell_flat, pushed = opened.reshape(-1), cells.reshape(-1), kinds.reshape(-1)
     for n in range(small.size):
         f = small[n]
         targets[n, :] = f
-        n1, n2 = shape[1], shape[2]
-        i, j, k = f // (n1 * n2), (f // n2) % n1, f % n2
+        i, j, k = place_in(f, shape)
+        find_beside(near, f, shape, wraps)
         ahead, shut = 0.0, 0.0
         for side in range(2):
             a = i - int(component == 0 and side == 0)
@@ -145,7 +167,7 @@ def find_targets(
             outside = a < 0 or b < 0 or c < 0
             if outside or a >= cell_shape[0] or b >= cell_shape[1] or c >= cell_shape[2]:
                 continue
-            to = neighbour(shape, wraps, f, 2 * component + side)
+            to = near[2 * component + side]
             volume = cell_flat[(a * cell_shape[1] + b) * cell_shape[2] + c]
             if to >= 0 and pushed[to] & DRIVEN and volume > 0.0:
                 targets[n, side], parts[n, side] = to, open_flat[to] * volume
@@ -158,7 +180,7 @@ def find_targets(
             continue
         most = 0.0
         for way in range(6):
-            to = -1 if way // 2 == component else neighbour(shape, wraps, f, way)
+            to = -1 if way // 2 == component else near[way]
             if to >= 0 and pushed[to] & DRIVEN and volume_flat[to] > most:
                 targets[n, 0], parts[n, 0], most = to, 1.0, volume_flat[to]
                 targets[n, 1], parts[n, 1] = f, 0.0
@@ -171,8 +193,8 @@ def find_targets(
             if given[n, 0] + given[n, 1] > 0.0:
                 continue
             most = -1.0
-            for way in range(6):
-                to = neighbour(shape, wraps, small[n], way)
+            find_beside(near, small[n], shape, wraps)
+            for to in near:
                 at = place_of(small, to, 0) if to >= 0 else small.size
                 if at == small.size or small[at] != to or given[at, 0] + given[at, 1] == 0.0:
                     continue
@@ -223,14 +245,14 @@ def fill_empty(
     field: Array, volumes: Array, listed: Integers, nothing: float, faces: FaceGrid
 ) -> None:
     """Give listed control volumes that hold nothing the mean of those beside them, in place."""
-    flat, volume = field.reshape(-1), volumes.reshape(-1)
+    flat, volume, near = field.reshape(-1), volumes.reshape(-1), np.empty(6, np.int64)
     for n in range(listed.size):
         f = listed[n]
         if volume[f] > nothing:
             continue
         total, weight = 0.0, 0.0
-        for way in range(6):
-            to = neighbour(faces.shape, faces.wraps, f, way)
+        find_beside(near, f, faces.shape, faces.wraps)
+        for to in near:
             if to >= 0 and volume[to] > nothing:
                 total += volume[to] * flat[to]
                 weight += volume[to]
@@ -262,16 +284,17 @@ def level(
     flat, volume, total = field.reshape(-1), volumes.reshape(-1), nought.reshape(-1)
     found, count = np.empty((2, listed.size), np.int64), 0
     part, whole, exchange = np.empty(listed.size), np.empty(listed.size), np.empty(listed.size)
+    near = np.empty(6, np.int64)
     for n in range(listed.size):
         f = listed[n]
         own = volume[f]
         if own <= nothing or leaving[n] <= 2.0 * own:
             continue
         best, largest = -1, own
-        for way in range(6):
-            to = neighbour(faces.shape, faces.wraps, f, way)
+        find_beside(near, f, faces.shape, faces.wraps)
+        for to in near:
             if to >= 0 and volume[to] > largest:
-                best, largest = to, volume[to]
+                best, largest = int(to), volume[to]
         if best >= 0:
             found[0, count], found[1, count] = f, best
             c = leaving[n] / own
@@ -315,7 +338,7 @@ def mark_cut(marks: Marks, listed: Integers, shape: Integers, wraps: Integers, r
     d0, d1 = (marks.shape[0] - shape[0]) // 2, (marks.shape[1] - n1) // 2
     d2 = (marks.shape[2] - n2) // 2
     for f in listed:
-        at = (f // (n1 * n2), (f // n2) % n1, f % n2)
+        at = place_in(f, shape)
         own = ((at[0] + d0) * marks.shape[1] + at[1] + d1) * marks.shape[2] + at[2] + d2
         for axis in range(3):
             step = marks.shape[1] * marks.shape[2] if axis == 0 else 1

@@ -18,8 +18,10 @@ from flowborne.kernels.control_volumes import (
     Closed,
     Transfers,
     across_axis,
+    find_beside,
     merge_small,
     neighbour,
+    place_in,
     place_of,
 )
 from flowborne.kernels.flux import Stage, in_line
@@ -52,8 +54,7 @@ class Openings(NamedTuple):
 def cell_beside(f: int, way: int, faces: FaceGrid) -> int:
     """Flat index of the cell on one side of face f of a component; -1 beyond the domain."""
     component, shape, wraps = faces
-    n1, n2 = shape[1], shape[2]
-    i, j, k = f // (n1 * n2), (f // n2) % n1, f % n2
+    n1, n2, (i, j, k) = shape[1], shape[2], place_in(f, shape)
     at = (i, j, k)[component] - 1 + way % 2
     count = shape[component] - 1
     if wraps[component] > 0:
@@ -75,9 +76,7 @@ def face_between(f: int, way: int, low: int, faces: FaceGrid, across: Integers) 
     across  (3,) shape of the faces across that axis
     """
     component, shape, wraps = faces
-    n1, n2 = shape[1], shape[2]
-    axis = way // 2
-    at = (f // (n1 * n2), (f // n2) % n1, f % n2)
+    axis, at = way // 2, place_in(f, shape)
     place, count, up = at[component] + low - 1, shape[component] - 1, way % 2
     if wraps[component] > 0:
         place %= count
@@ -225,13 +224,13 @@ def with_neighbours(cut: Integers, kinds: Marks, faces: FaceGrid) -> Integers:
     kinds  of the faces; on return LISTED too where a face is in the list
     """
     kind = kinds.reshape(-1)
-    found, count = np.empty(7 * cut.size, np.int64), cut.size
+    found, count, near = np.empty(7 * cut.size, np.int64), cut.size, np.empty(6, np.int64)
     for n in range(count):
         found[n] = cut[n]
         kind[cut[n]] |= LISTED
     for f in cut:
-        for way in range(6):
-            to = neighbour(faces.shape, faces.wraps, f, way)
+        find_beside(near, f, faces.shape, faces.wraps)
+        for to in near:
             if to >= 0 and kind[to] & DRIVEN and not kind[to] & LISTED:
                 kind[to] |= LISTED
                 found[count] = to
@@ -261,11 +260,10 @@ def share_out(
     component, shape, wraps = faces
     flat, part_flat = volume.reshape(-1), across_axis(opened, component).reshape(-1)
     size = listed.size
-    stride = shape[1] * shape[2] if component == 0 else (shape[2] if component == 1 else 1)
     part, held, aim = np.empty(size), np.empty(size), np.empty(size)
     for n in range(size):
         f = listed[n]
-        part[n], held[n], at = part_flat[f], flat[f], (f // stride) % shape[component]
+        part[n], held[n], at = part_flat[f], flat[f], place_in(f, shape)[component]
         outer = wraps[component] == 0 and (at == 0 or at == shape[component] - 1)
         aim[n] = cell * part[n] * (0.5 if outer else 1.0)
     above, way = np.empty((3, size), np.int64), np.empty((3, size))
