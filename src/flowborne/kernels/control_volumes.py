@@ -135,6 +135,26 @@ def place_of(listed: Integers, f: int, near: int) -> int:
 
 
 @njit(nogil=True, cache=True)
+def merged(one: Integers, other: Integers) -> tuple[Integers, Integers, Integers]:
+    """What is in one of two lists in ascending order or in both, in one such list; and where in it
+    the elements of each are."""
+    found, a, b, count = np.empty(one.size + other.size, np.int64), 0, 0, 0
+    first, second = np.empty(one.size, np.int64), np.empty(other.size, np.int64)
+    while a < one.size or b < other.size:
+        beyond = b == other.size or (a < one.size and one[a] < other[b])
+        both = not beyond and a < one.size and one[a] == other[b]
+        found[count] = one[a] if beyond else other[b]
+        if beyond or both:
+            first[a] = count
+            a += 1
+        if not beyond:
+            second[b] = count
+            b += 1
+        count += 1
+    return found[:count].copy(), first, second
+
+
+@njit(nogil=True, cache=True)
 def find_targets(
     small: Integers, kinds: Marks, opened: Array, volumes: Array, cells: Array, faces: FaceGrid
 ) -> tuple[Integers, Array]:
