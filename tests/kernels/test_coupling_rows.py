@@ -5,8 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flowborne.fluid.ghosts import planes
-from flowborne.fluid.grid import Grid
 from flowborne.kernels.arrays import FREE, PRESCRIBED
 from flowborne.kernels.coupling_rows import (
     COVERED,
@@ -44,9 +42,10 @@ def test_kinds_of_cells(shape: tuple[int, int, int], normal: np.ndarray) -> None
     expected = kinds_of_cells_reference(tuple(opened), normal)
     kinds = {COVERED, NARROW, WIDE} | ({ENCLOSED} if (normal == PRESCRIBED).any() else set())
     assert set(np.unique(expected)) == kinds
-    grid = Grid(shape, 0.1)
-    found = kinds_of_cells(*planes(tuple(opened), grid), np.roll(normal, int(grid.is_slab), axis=0))
-    np.testing.assert_array_equal(found.reshape(shape), expected)
+    whole = np.array([[[0, n + 1] for n in shape]])
+    np.testing.assert_array_equal(kinds_of_cells(*opened, normal, whole), expected)
+    outside = kinds_of_cells(*opened, normal, whole - [[[0, 1], [0, 0], [0, 0]]])[-1]
+    assert (outside == WIDE).all()
 
 
 @pytest.mark.parametrize("shape", SHAPES)

@@ -85,7 +85,7 @@ def advect_momentum(start: Departure, velocity: Faces, transport: Transport) -> 
     dt, arrived = transport.dt, [np.zeros(u.shape) for u in velocity[len(grid.axes) :]]
     crossed, stopped, gained = np.zeros((3, 3))
     drunk = [np.zeros(3) for _ in jets]
-    cells = cells_with_inlets(jets, start.sources)
+    cells = cells_with_inlets(jets, start.sources, fluid.sources, grid)
     for axis in grid.axes:
         inlets = inlets_across(axis, cells, jets, start.sources, grid, sides)
         along = np.empty(velocity[axis].shape)
