@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from flowborne.kernels.arrays import FREE, PERIODIC, PRESCRIBED
-from flowborne.kernels.projection import net_out, subtract_gradient
+from flowborne.kernels.projection import net_out, open_outflow, subtract_gradient
 
 from .references.outflow import outflow_reference
 from .references.pressure_gradient import subtract_gradient_reference
@@ -29,6 +29,17 @@ def test_outflow(shape: tuple[int, int, int]) -> None:
     velocity, opened, out = faces(shape, 0), faces(shape, 1), np.empty(shape)
     net_out(out, *(a * u for a, u in zip(opened, velocity, strict=True)))
     np.testing.assert_allclose(out, outflow_reference(velocity, opened), atol=1e-14)
+
+
+@pytest.mark.parametrize("shape", SHAPES[:2])
+def test_open_outflow(shape: tuple[int, int, int]) -> None:
+    velocity, opened, out = faces(shape, 0), faces(shape, 1), np.empty(shape)
+    rate = np.random.default_rng(2).standard_normal(shape)
+    if shape[2] == 1:  # no fluid moves across a slab
+        velocity[2][:] = 0.0
+    open_outflow(out, tuple(opened), tuple(velocity), rate, 0.3)
+    expected = 0.3 * outflow_reference(velocity, opened) - rate
+    np.testing.assert_allclose(out, expected, atol=1e-14)
 
 
 @pytest.mark.parametrize("shape", SHAPES)
