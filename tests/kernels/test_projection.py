@@ -10,7 +10,7 @@ import pytest
 from flowborne.fluid.ghosts import plane, planes
 from flowborne.fluid.grid import Grid
 from flowborne.kernels.arrays import FREE, PERIODIC, PRESCRIBED
-from flowborne.kernels.projection import net_out, subtract_gradient
+from flowborne.kernels.projection import net_out, open_outflow, subtract_gradient
 
 from .references.outflow import outflow_reference
 from .references.pressure_gradient import subtract_gradient_reference
@@ -34,6 +34,17 @@ def test_outflow(shape: tuple[int, int, int]) -> None:
         expected = outflow_reference([*velocity[:2], 0.0 * velocity[2]], opened)
     x, y, z = (a * u for a, u in zip(opened, velocity, strict=True))
     net_out(plane(out, grid), *planes((x, y, z), grid))
+    np.testing.assert_allclose(out, expected, atol=1e-14)
+
+
+@pytest.mark.parametrize("shape", SHAPES[:2])
+def test_open_outflow(shape: tuple[int, int, int]) -> None:
+    velocity, opened, out = faces(shape, 0), faces(shape, 1), np.empty(shape)
+    rate = np.random.default_rng(2).standard_normal(shape)
+    if shape[2] == 1:  # no fluid moves across a slab
+        velocity[2][:] = 0.0
+    open_outflow(out, tuple(opened), tuple(velocity), rate, 0.3)
+    expected = 0.3 * outflow_reference(velocity, opened) - rate
     np.testing.assert_allclose(out, expected, atol=1e-14)
 
 

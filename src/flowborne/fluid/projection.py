@@ -21,7 +21,7 @@ from flowborne.fluid.dipoles import Dipoles
 from flowborne.fluid.ghosts import plane
 from flowborne.fluid.grid import Grid, faces_of
 from flowborne.kernels.arrays import Array, Faces
-from flowborne.kernels.faces import accelerate
+from flowborne.kernels.faces import accelerate, weigh
 from flowborne.kernels.projection import subtract_gradient
 
 EVEN = 1e-9
@@ -44,7 +44,10 @@ def accelerated(opened: Faces, mass: Faces, grid: Grid, boundaries: Boundaries) 
 
 def face_weights(opened: Faces, rate: Faces, grid: Grid) -> Faces:
     """Weights w = a A rate of the pressure matrix, of a A / m; see the module."""
-    return faces_of([grid.face_area * o * r for o, r in zip(opened, rate, strict=True)])
+    weights = faces_of([np.empty(o.shape) for o in opened])
+    for weight, part, of_face in zip(weights, opened, rate, strict=True):
+        weigh(weight, part, of_face, grid.face_area)
+    return weights
 
 
 @dataclass(frozen=True)

@@ -40,6 +40,29 @@ def push(
 
 
 @kernel
+def open_outflow(out: Array, opened: Faces, velocity: Faces, rate: Array, area: float) -> None:
+    """Net volume that leaves each cell per time through open parts of its faces, less `rate`."""
+    a0, a1, a2 = opened
+    u0, u1, u2 = velocity
+    net, less = out, rate
+    d = int(out.shape[2] > 1)
+    if not d:  # a slab's rows along y
+        n0, n1 = out.shape[0], out.shape[1]
+        net, less = out.reshape((1, n0, n1)), rate.reshape((1, n0, n1))
+        a1, a2 = a0.reshape((1, n0 + 1, n1)), a1.reshape((1, n0, n1 + 1))
+        u1, u2 = u0.reshape((1, n0 + 1, n1)), u1.reshape((1, n0, n1 + 1))
+    for i in prange(net.shape[0]):
+        for j in range(net.shape[1]):
+            for k in range(net.shape[2]):
+                total = 0.0
+                if d:
+                    total = a0[i + 1, j, k] * u0[i + 1, j, k] - a0[i, j, k] * u0[i, j, k]
+                total = total + a1[i, j + 1, k] * u1[i, j + 1, k] - a1[i, j, k] * u1[i, j, k]
+                total = total + a2[i, j, k + 1] * u2[i, j, k + 1] - a2[i, j, k] * u2[i, j, k]
+                net[i, j, k] = total * area - less[i, j, k]
+
+
+@kernel
 def subtract_gradient(
     velocity: Array, rate: Array, pressure: Array, axis: int, scale: float, periodic: bool
 ) -> None:
