@@ -26,6 +26,10 @@ DRIVEN, PART, SHUT, UNEVEN, LISTED = 1, 2, 4, 8, 16
 it, and it has one; its control volume is not what its opening says; it is in a list."""
 
 
+Place = tuple[int, int, int]
+"""Indices along each axis."""
+
+
 class Closed(NamedTuple):
     """Faces of one component that pressure does not push; what they hold goes to their targets.
 
@@ -60,7 +64,7 @@ def across_axis(faces: Faces, axis: int) -> Array:
 
 
 @inlined
-def place_in(f: int, shape: Integers) -> tuple[int, int, int]:
+def place_in(f: int, shape: Integers) -> Place:
     """Indices of a flat one: two divisions of 32 bits."""
     row = np.int64(np.uint32(f) // np.uint32(shape[2]))
     i = np.int64(np.uint32(row) // np.uint32(shape[1]))

@@ -16,15 +16,17 @@ from flowborne.kernels.control_volumes import (
     DRIVEN,
     LISTED,
     Closed,
+    Place,
     Transfers,
     across_axis,
+    both_ways,
     find_beside,
     merge_small,
-    neighbour,
     place_in,
     place_of,
 )
 from flowborne.kernels.flux import Stage, in_line
+from flowborne.kernels.jit import inlined
 
 KEPT = 0.5
 """Part of the smaller of what one holds and of a h^3 that it keeps at least in a sweep."""
@@ -50,12 +52,12 @@ class Openings(NamedTuple):
     rest: Array
 
 
-@njit(nogil=True, cache=True)
-def cell_beside(f: int, way: int, faces: FaceGrid) -> int:
-    """Flat index of the cell on one side of face f of a component; -1 beyond the domain."""
+@inlined
+def cell_beside(place: Place, way: int, faces: FaceGrid) -> int:
+    """Flat index of the cell on one side of a face of a component; -1 beyond the domain."""
     component, shape, wraps = faces
-    n1, n2, (i, j, k) = shape[1], shape[2], place_in(f, shape)
-    at = (i, j, k)[component] - 1 + way % 2
+    n1, n2, (i, j, k) = shape[1], shape[2], place
+    at = place[component] - 1 + way % 2
     count = shape[component] - 1
     if wraps[component] > 0:
         at %= count
@@ -68,15 +70,15 @@ def cell_beside(f: int, way: int, faces: FaceGrid) -> int:
     return int((i * n1 + j) * (n2 - 1) + at)
 
 
-@njit(nogil=True, cache=True)
-def face_between(f: int, way: int, low: int, faces: FaceGrid, across: Integers) -> int:
-    """Flat index of one of the two faces between control volume f and the one beside it along
+@inlined
+def face_between(at: Place, way: int, low: int, faces: FaceGrid, across: Integers) -> int:
+    """Flat index of one of the two faces between a control volume and the one beside it along
     another axis: that at the lower (0) or upper (1) of its cells; -1 beyond the domain.
 
     across  (3,) shape of the faces across that axis
     """
     component, shape, wraps = faces
-    axis, at = way // 2, place_in(f, shape)
+    axis = way // 2
     place, count, up = at[component] + low - 1, shape[component] - 1, way % 2
     if wraps[component] > 0:
         place %= count
@@ -112,10 +114,14 @@ def openings(
     across, room = across_axis(opened, axis), cells.reshape(-1)
     own, sides = across_axis(opened, faces.component).reshape(-1), across.reshape(-1)
     wide, near = np.array(across.shape), [0, 0]
+    shape, period = faces.shape, faces.wraps[axis]
+    step = shape[1] * shape[2] if axis == 0 else (shape[2] if axis == 1 else 1)
     for n in range(listed.size):
         f, above[n] = listed[n], -1
+        place = place_in(f, shape)
+        both = both_ways(f, place[axis], step, shape[axis], period)
         for side in range(2):
-            to = neighbour(faces.shape, faces.wraps, f, 2 * axis + side)
+            to = both[side]
             if to < 0:
                 continue
             at = near[side] = place_of(listed, to, near[side])
@@ -123,12 +129,12 @@ def openings(
             if there and side == 0:
                 continue
             if axis == faces.component:
-                part = room[cell_beside(f, side, faces)] / cell
+                part = room[cell_beside(place, side, faces)] / cell
                 opening = min(max(part, 0.0), 1.0)
             else:
                 total, count = 0.0, 0
                 for low in range(2):
-                    between = face_between(f, 2 * axis + side, low, faces, wide)
+                    between = face_between(place, 2 * axis + side, low, faces, wide)
                     if between >= 0:
                         total += sides[between]
                         count += 1
