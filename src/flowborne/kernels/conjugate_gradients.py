@@ -178,7 +178,7 @@ def solve(
 
     vectors  padded x and rhs, scratch r, p, q with ghosts 0; rhs loses its part along the null
              vectors, x as well at the end
-    guessed  whether x may be other than 0
+    guessed  whether x is other than 0
     returns  iterations, |rhs - A x| / |rhs|, whether the residual asked for was reached
     """
     finest, rows, mobility, beyond, label, null = matrix

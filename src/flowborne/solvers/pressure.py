@@ -169,8 +169,9 @@ class PressureSystem:
         if self._prepared is None or self._prepared[0] is not term:
             self._prepared = term, *self._with_term(term)
         matrix, cycle = self._prepared[1:]
+        guessed = guess is not None and bool(guess.any())
         iterations, residual, converged = solve(
-            matrix, cycle, b.vectors, tolerance, absolute, guess is not None
+            matrix, cycle, b.vectors, tolerance, absolute, guessed
         )
         start = (1 if inner[0] > 1 else 0, 1, 1)
         inside = tuple(slice(s, s + n) for s, n in zip(start, cells, strict=True))
