@@ -51,12 +51,17 @@ def leak_proof(velocity: Faces, geometry: Geometry, moving: Array, grid: Grid) -
 
     moving  (k,) see `motion`
     """
-    first = moving.size - geometry.skins.vertices.size
     carried = [opened * u for opened, u in zip(geometry.open, velocity, strict=True)]
-    twist, flesh = moving[:first].reshape(-1, 6), moving[first:].reshape(-1, 3)
     for axis in grid.axes:
-        add_body_velocity(carried[axis], axis, geometry.closed, twist, flesh)
+        add_bodies(carried[axis], axis, geometry, moving)
     return carried[0], carried[1], carried[2]
+
+
+def add_bodies(out: Array, axis: int, geometry: Geometry, moving: Array) -> None:
+    """Add closed part x body velocity on the faces across `axis`, in place, for the motion (k,)."""
+    first = moving.size - geometry.skins.vertices.size
+    twist, flesh = moving[:first].reshape(-1, 6), moving[first:].reshape(-1, 3)
+    add_body_velocity(out, axis, geometry.closed, twist, flesh)
 
 
 def add_flux(out: Array, geometry: Geometry, moving: Array) -> None:
