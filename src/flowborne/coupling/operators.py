@@ -57,11 +57,16 @@ def leak_proof(velocity: Faces, geometry: Geometry, moving: Array, grid: Grid) -
 
 def carried(axis: int, velocity: Faces, geometry: Geometry, moving: Array) -> Array:
     """Its component along an axis."""
-    first = moving.size - geometry.skins.vertices.size
     field = geometry.open[axis] * velocity[axis]
-    twist, flesh = moving[:first].reshape(-1, 6), moving[first:].reshape(-1, 3)
-    add_body_velocity(field, axis, geometry.closed, twist, flesh)
+    add_bodies(field, axis, geometry, moving)
     return field
+
+
+def add_bodies(out: Array, axis: int, geometry: Geometry, moving: Array) -> None:
+    """Add closed part x body velocity on the faces across `axis`, in place, for the motion (k,)."""
+    first = moving.size - geometry.skins.vertices.size
+    twist, flesh = moving[:first].reshape(-1, 6), moving[first:].reshape(-1, 3)
+    add_body_velocity(out, axis, geometry.closed, twist, flesh)
 
 
 def add_flux(out: Array, geometry: Geometry, moving: Array) -> None:
