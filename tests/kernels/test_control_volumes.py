@@ -156,20 +156,6 @@ def test_what_is_on_either_side_of_a_thin_body_stays_there() -> None:
     np.testing.assert_allclose(parts, [[0.54 / 0.68, 0.14 / 0.68]])
 
 
-def test_what_has_no_way_ahead_goes_with_what_is_beside_it() -> None:
-    """A pocket of 0.6, closed beyond, is not joined through a body to a sliver of 0.2 behind it."""
-    cells, opened, volumes = np.zeros((4, 2, 1)), np.zeros((5, 2, 1)), np.zeros((5, 2, 1))
-    cells[:, 0, 0] = 0.0, 0.6, 0.2, 1.0
-    opened[:, 0, 0] = 0.0, 0.0, 0.0, 0.7, 1.0
-    volumes[:, 0, 0] = 0.0, 0.3, 0.4, 0.6, 1.0
-    cells[1:3, 1], opened[2, 1], volumes[2, 1] = 1.0, 0.4, 0.5
-    faces = FaceGrid(0, np.array(opened.shape), np.zeros(3, np.int64))
-    pushed, closed = (opened > 0.0).astype(np.uint8), np.array([2 * 2])
-    targets, parts = find_targets(closed, pushed, opened, volumes, cells, faces)
-    (joined,) = targets[parts > 0.0]
-    assert joined == 2 * 2 + 1
-
-
 @ROOM_OR_SLAB
 def test_small_ones_give_to_targets(shape: tuple, periodic: tuple, component: int) -> None:
     case = case_of(shape, periodic, component)

@@ -163,8 +163,7 @@ def find_targets(
 
     A face that is wholly closed has a control volume where a cell beside it is open in part. What
     lies there goes along with the opposite faces of both cells, in proportion to their open parts
-    and to those of the cells; where the opposite face of the larger cell is closed, or ends the
-    domain, with the largest neighbour across the other axes, so that nothing passes through a body;
+    and to those of the cells; where both are closed with the neighbour that has the largest volume,
     else with the targets of a neighbour, which may have them from another.
 
     small    (n,) closed faces with a volume
@@ -182,7 +181,6 @@ def find_targets(
         targets[n, :] = f
         i, j, k = indices(shape, f)
         find_beside(beside, shape, wraps, f)
-        ahead, shut = 0.0, 0.0
         for side in range(2):
             a = i - int(component == 0 and side == 0)
             b = j - int(component == 1 and side == 0)
@@ -201,21 +199,14 @@ def find_targets(
             volume = cell_flat[(a * cell_shape[1] + b) * cell_shape[2] + c]
             if to >= 0 and pushed[to] & DRIVEN and volume > 0.0:
                 targets[n, side], parts[n, side] = to, open_flat[to] * volume
-                ahead += volume
-            else:
-                shut += volume
         total = parts[n, 0] + parts[n, 1]
-        if total > 0.0 and ahead >= shut:
+        if total > 0.0:
             parts[n] /= total
             continue
         most = 0.0
-        for way in range(6):
-            to = -1 if way // 2 == component else beside[way]
+        for to in beside:
             if to >= 0 and pushed[to] & DRIVEN and volume_flat[to] > most:
                 targets[n, 0], parts[n, 0], most = to, 1.0, volume_flat[to]
-                targets[n, 1], parts[n, 1] = f, 0.0
-        if most == 0.0 and total > 0.0:
-            parts[n] /= total
     led = True
     while led:
         led, first, given = False, targets.copy(), parts.copy()

@@ -54,12 +54,9 @@ def find_targets_reference(
     held = np.where(driven[opposite], cell * opened.ravel()[beside[opposite]], 0.0)
     targets = np.where(held > 0.0, beside[opposite], small)
     parts = held / np.where(held.sum(axis=0) > 0.0, held.sum(axis=0), 1.0)
-    ahead, shut = (np.where(way, cell, 0.0).sum(axis=0) for way in (held > 0.0, held == 0.0))
-    across = driven & (np.arange(6) // 2 != component)[:, None]
-    near, touched = largest_reference(beside, np.where(across, volumes.ravel()[beside], 0.0), 0.0)
-    alone = touched & ((ahead < shut) | ~parts.any(axis=0))
+    near, touched = largest_reference(beside, np.where(driven, volumes.ravel()[beside], 0.0), 0.0)
+    alone = touched & ~parts.any(axis=0)
     targets[0, alone], parts[0, alone] = near[alone], 1.0
-    targets[1, alone], parts[1, alone] = small[alone], 0.0
     while True:
         place = np.zeros(opened.size, np.int64)
         place[small] = np.arange(small.size)
