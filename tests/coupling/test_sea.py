@@ -10,7 +10,6 @@ import pytest
 import flowborne as fb
 from flowborne.coupling.world import World
 from flowborne.fluid.grid import Grid
-from flowborne.kernels.arrays import Array
 from flowborne.sim.frame import Snapshot
 from flowborne.worlds import (
     Boundaries,
@@ -24,7 +23,7 @@ from flowborne.worlds import (
     make_world,
     set_velocity,
 )
-from flowborne_validation.far_sides import box
+from flowborne_validation.far_sides import box, pair
 from flowborne_validation.shedding import UNBOUNDED, cylinder
 from flowborne_validation.worlds import Uniform, force_on, mjcf, start_at_once
 
@@ -142,16 +141,6 @@ def test_an_oblique_stream_past_a_cylinder() -> None:
     force = 2.0 * force_on(report)
     assert 0.8 * force[0] + 0.6 * force[1] == pytest.approx(1.323, rel=0.05)
     assert abs(0.8 * force[1] - 0.6 * force[0]) < 0.08
-
-
-def pair(x: Array, y: Array, z: Array) -> tuple[Array, Array, Array]:
-    """Two vortices of 2 pi m^2/s, 1 m apart, that go along x at 1 m/s."""
-    u, v = 0.0 * (x + y + z), 0.0 * (x + y + z)
-    for place, sign in ((0.5, -1.0), (-0.5, 1.0)):
-        square = np.maximum(x**2 + (y - place) ** 2, 1e-12)
-        turning = sign * (1.0 - np.exp(-16.0 * square)) / square
-        u, v = u - turning * (y - place), v + turning * x
-    return u, v, 0.0 * u
 
 
 def left_behind(side: Boundary) -> float:

@@ -15,6 +15,8 @@ import flowborne.studies.error_bars as error_bars
 from flowborne import Refinement
 from flowborne.sim.running import RunOutcome
 
+from .conftest import MASS
+
 
 @pytest.mark.parametrize("order", [0.7, 1.0, 2.0, 3.0])
 @pytest.mark.parametrize("cells", [(10, 20, 40), (10, 14, 30), (24, 61, 90)])
@@ -165,10 +167,6 @@ positions = { along = 1.0 }
 [output]
 checkpoint_every = 5
 """
-MASS = (
-    '<mujoco><worldbody><body name="mass"><joint name="along" type="slide" axis="1 0 0" '
-    'stiffness="4"/><geom type="sphere" size="0.1" mass="1"/></body></worldbody></mujoco>'
-)
 
 
 def test_steps_of_a_scene_show_the_order_of_its_scheme(tmp_path: Path) -> None:

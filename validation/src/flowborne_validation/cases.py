@@ -10,8 +10,8 @@ from importlib import import_module
 from importlib.resources import files
 from typing import Any
 
-from flowborne_validation.case import Case, Rule, Tier, entries
-from flowborne_validation.findings import Figures, figure_of, over
+from flowborne_validation.case import Case, Tier, entries
+from flowborne_validation.findings import Figures, Rule, figure_of, over
 
 
 @cache
