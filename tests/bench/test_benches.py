@@ -74,10 +74,8 @@ def test_parts_of_a_frame_add_up():
 
 
 def test_memory_of_a_run_does_not_grow():
-    """From frame 60 to 90: what the garbage collector has not taken yet varies by up to 0.06 MB of
-    3.9. With it collected a run holds 3.67 MB at frames 60 to 180, to 0.01."""
     scene = load_scene(frame_costs.BLOCK, COARSE)
-    per_cell, growth = frame_costs.footprint(scene, early=60, late=90)
+    per_cell, growth = frame_costs.footprint(scene, early=30, late=60)
     assert 100.0 < per_cell.value < 100_000.0
     assert growth.verdict == "pass", growth
     assert growth.value > 0.0

@@ -7,11 +7,13 @@ import pytest
 
 from flowborne.kernels.smoothing import (
     BLOCK,
+    STEPS,
     apply_laplacian,
     defect,
     first_smooth,
     smooth,
     smooth_down,
+    smooth_often,
     smooth_up,
     turn_and_apply,
 )
@@ -64,6 +66,21 @@ def test_smoothing_on_the_way_down_and_up(shape: tuple[int, int, int], threads: 
     smooth(left, expected, b, K, 1)
     smooth(expected, left, b, K, 0)
     getattr(smooth_up, threads)(x, r, b, K)
+    np.testing.assert_array_equal(x, expected)
+
+
+@pytest.mark.parametrize("shape", [(4, 2, 3), (1, 3, 4)])
+@pytest.mark.parametrize("even", [0, 1])
+def test_many_steps_on_the_coarsest_level(shape: tuple[int, int, int], even: int) -> None:
+    w, diagonal, (x, b, r) = system(shape, np.float32)
+    inverse = np.divide(1.0, diagonal, out=np.zeros_like(diagonal), where=diagonal > 0.0)
+    K = operator(w, inverse)
+    K[4][...] = even
+    expected, left = x.copy(), r.copy()
+    for step in range(1, 9):
+        smooth(left, expected, b, K, step % STEPS)
+        expected, left = left, expected
+    smooth_often(x, r, b, K, 9)
     np.testing.assert_array_equal(x, expected)
 
 

@@ -19,6 +19,7 @@ from flowborne.kernels.control_volumes import (
     listed_kinds,
     mark_cut,
     merge_small,
+    merged,
     neighbour,
     share_velocity,
     sort_faces,
@@ -114,6 +115,16 @@ def test_neighbours(shape: tuple, periodic: tuple, component: int) -> None:
     expected = neighbours_reference(case.shape, case.wraps)
     for f, way in product(range(case.volumes.size), range(6)):
         assert neighbour(case.shape, case.wraps, f, way) == expected[way, f]
+
+
+@pytest.mark.parametrize("sizes", [(40, 30), (0, 5), (5, 0), (0, 0)])
+def test_merged(sizes: tuple[int, int]) -> None:
+    random = np.random.default_rng(1)
+    one, other = (np.sort(random.choice(60, size, replace=False)) for size in sizes)
+    found, first, second = merged(one, other)
+    np.testing.assert_array_equal(found, np.union1d(one, other))
+    np.testing.assert_array_equal(found[first], one)
+    np.testing.assert_array_equal(found[second], other)
 
 
 @ROOM_OR_SLAB

@@ -42,7 +42,10 @@ def test_kinds_of_cells(shape: tuple[int, int, int], normal: np.ndarray) -> None
     expected = kinds_of_cells_reference(tuple(opened), normal)
     kinds = {COVERED, NARROW, WIDE} | ({ENCLOSED} if (normal == PRESCRIBED).any() else set())
     assert set(np.unique(expected)) == kinds
-    np.testing.assert_array_equal(kinds_of_cells(*opened, normal), expected)
+    whole = np.array([[[0, n + 1] for n in shape]])
+    np.testing.assert_array_equal(kinds_of_cells(*opened, normal, whole), expected)
+    outside = kinds_of_cells(*opened, normal, whole - [[[0, 1], [0, 0], [0, 0]]])[-1]
+    assert (outside == WIDE).all()
 
 
 @pytest.mark.parametrize("shape", SHAPES)

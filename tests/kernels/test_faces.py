@@ -9,9 +9,11 @@ from flowborne.kernels.faces import (
     accelerate,
     changes_of_step,
     largest_open,
+    largest_size,
     mean_flux,
     mean_row,
     still_to_come,
+    weigh,
     weighted_change,
 )
 
@@ -56,6 +58,14 @@ def test_rates(shape: Shape) -> None:
 
 
 @SHAPES
+def test_weights(shape: Shape) -> None:
+    opened, rate = np.abs(fields(shape, 2))
+    weight = np.empty(shape)
+    weigh(weight, opened, rate, 0.3)
+    np.testing.assert_allclose(weight, 0.3 * opened * rate, rtol=1e-15)
+
+
+@SHAPES
 def test_mean_flux(shape: Shape) -> None:
     u, change, before, after = fields(shape, 4)
     flux, weight = np.empty(shape), np.empty(shape)
@@ -90,3 +100,4 @@ def test_largest_open(shape: Shape) -> None:
     field, opened = fields(shape, 2)
     expected = np.abs(field).max(where=opened > 0.0, initial=0.0)
     assert largest_open(field, opened) == expected
+    assert largest_size(field) == np.abs(field).max()

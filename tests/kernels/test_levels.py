@@ -13,8 +13,10 @@ from flowborne.kernels.levels import (
     at_level,
     coarse_sums,
     coarse_weights,
+    columns_to_diagonal,
     distance_ratio,
     finest_weights,
+    has_any,
     interpolation_weights,
     inverse_diagonal,
     orphans_at,
@@ -27,6 +29,7 @@ from .references.centres import distance_ratio_reference, interpolation_weights_
 from .references.levels import (
     coarse_sums_reference,
     coarse_weights_reference,
+    columns_to_diagonal_reference,
     finest_weights_reference,
     inverse_diagonal_reference,
 )
@@ -131,3 +134,21 @@ def test_regions(shape: tuple, periodic: tuple, seed: int) -> None:
     rows = cells, start, random.integers(0, size, start[-1]), random.standard_normal(start[-1])
     expected = region_loads_reference(label, regions, size, rows)
     np.testing.assert_allclose(region_loads(label, regions, size, rows), expected, atol=1e-13)
+
+
+@pytest.mark.parametrize("shape", [(5, 3, 6), (1, 4, 5), (3, 3, 3)])
+@pytest.mark.parametrize("periodic", [(0, 0, 0), (1, 0, 1)])
+def test_weak_columns_go_to_the_diagonal(
+    shape: tuple[int, int, int], periodic: tuple[int, int, int]
+) -> None:
+    random = np.random.default_rng(0)
+    weights = [random.random(shape, np.float32) for _ in range(3)]
+    added = random.random(shape, np.float32)
+    expected, sums = [w.copy() for w in weights], added.copy()
+    ring = np.array(periodic, np.uint8)
+    columns_to_diagonal_reference(tuple(expected), sums, ring)
+    columns_to_diagonal(tuple(weights), added, ring)
+    np.testing.assert_array_equal(added, sums)
+    np.testing.assert_array_equal(weights, expected)
+    assert has_any(added)
+    assert not has_any(0.0 * added)

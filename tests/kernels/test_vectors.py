@@ -29,8 +29,9 @@ def test_sums_and_steps(shape: tuple[int, int, int]) -> None:
     turn(p, q, 0.7)
     for found, expected in zip((x, r, p), after, strict=True):
         np.testing.assert_allclose(found, expected, atol=1e-15)
-    true_residual(r, x, q)
-    np.testing.assert_array_equal(r, x - q)
+    left = x - q
+    assert true_residual(r, x, q) == pytest.approx(np.vdot(left, left))
+    np.testing.assert_array_equal(r, left)
 
 
 @pytest.mark.parametrize("shape", SHAPES)
@@ -60,8 +61,8 @@ def test_sums_have_the_same_bits_on_any_number_of_threads(
         at, left, direction = x.copy(), r.copy(), p.copy()
         turn(direction, q, 0.7)
         after = descend(at, left, direction, q, 0.3, b, 2.0)
-        true_residual(left, at, q)
-        return dot(at, left), dot(b, left, 0.5), after
+        square = true_residual(left, at, q)
+        return dot(at, left), dot(b, left, 0.5), after, square
 
     expected = sums()
     with kernel_threads(threads):

@@ -30,7 +30,8 @@ def parts(distance: Array, found: Crossings, flat: bool = False) -> Array:
         for at in np.ndindex(faces[axis].shape):
             faces[axis][at] -= closed_face(distance, found, axis, *at, flat, False)[0]
     out = np.empty(shape)
-    open_cells(out, distance, found, *faces, np.array([[0, n] for n in distance.shape]))
+    box = np.array([[[0, n] for n in distance.shape]])
+    open_cells(out, 1.0, distance, found, tuple(faces), box)
     return out
 
 
@@ -121,8 +122,8 @@ def test_cells_without_an_open_face_hold_nothing() -> None:
     for axis in range(3):
         faces[axis][(0, 0, 0)] = faces[axis][tuple(np.eye(3, dtype=int)[axis])] = 0.0
     out = np.empty(shape)
-    box = np.array([[0, 3]] * 3)
-    open_cells(out, distance, new_crossings(distance, 1e-9, False), *faces, box)
+    box, found = np.array([[[0, 3]] * 3]), new_crossings(distance, 1e-9, False)
+    open_cells(out, 1.0, distance, found, tuple(faces), box)
     assert out[0, 0, 0] == 0.0
     assert out.sum() == 7.0
 

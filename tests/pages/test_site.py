@@ -109,5 +109,5 @@ def test_types_and_limits_are_told_in_words() -> None:
     assert rows["`gravity`"] == ["`[x, y]` or `[x, y, z]`", "`[0, 0, 0]`"]
     fluid = next(scene_keys.tables_in(scene_keys.hints_of(Scene)["fluid"]))
     rows = {row[0]: row[1:3] for row in scene_keys.rows(fluid)}
-    assert rows["`tolerance`"] == ["number > 0, < 1", "`1e-09`"]
+    assert rows["`tolerance`"] == ["number > 0, < 1", "`1e-07`"]
     assert rows["`coupling`"][1] == '`"two-way"`'

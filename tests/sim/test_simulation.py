@@ -5,6 +5,7 @@ import pytest
 
 import flowborne
 from flowborne.coupling.report import Outcome
+from flowborne.sim import simulation as module
 from flowborne.sim.simulation import BlowUpError, Simulation, default_workers, turning_dofs
 
 
@@ -152,6 +153,21 @@ def test_workers_are_as_many_as_trials_but_no_more_than_processors(monkeypatch):
     monkeypatch.setattr("flowborne.sim.simulation.cores", lambda: 4)
     assert [default_workers(joints, True) for joints in (0, 1, 2, 3)] == [1, 2, 4, 4]
     assert default_workers(3, False) == 1
+
+
+def test_kernels_of_small_grids_run_on_one_thread(small_scene, monkeypatch):
+    """They would not share out anything: so nothing is searched for."""
+    given = []
+    limited = module.kernel_threads
+    monkeypatch.setattr(
+        module, "kernel_threads", lambda most=None: given.append(most) or limited(most)
+    )
+    with Simulation(small_scene, workers=1) as sim:
+        sim.advance_frame()
+        assert given[-1] == 1
+        monkeypatch.setattr(module, "LARGE", 0)
+        sim.advance_frame()
+        assert given[-1] is None
 
 
 def test_no_worker_is_refused(small_scene):

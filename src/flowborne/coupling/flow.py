@@ -18,14 +18,14 @@ from flowborne.coupling.mouths import (
     inlets_across,
     taken_by,
 )
-from flowborne.coupling.operators import boundary_velocity, leak_proof
+from flowborne.coupling.operators import add_bodies, boundary_velocity
 from flowborne.coupling.solve import SolvedFlow
 from flowborne.coupling.world import Fluid, World
 from flowborne.fluid.boundary import cells_in
 from flowborne.fluid.control_volumes import ControlVolumes, control_volumes
 from flowborne.fluid.dye import Dyed, Passage, carry_dye
 from flowborne.fluid.ghosts import edge, impose_sides
-from flowborne.fluid.grid import faces_of
+from flowborne.fluid.grid import Grid, faces_of
 from flowborne.fluid.projection import accelerated
 from flowborne.fluid.transport import Transport, carry_component, damp_eddies
 from flowborne.kernels.arrays import PERIODIC, Array, Faces
@@ -85,7 +85,7 @@ def advect_momentum(start: Departure, velocity: Faces, transport: Transport) -> 
     dt, arrived = transport.dt, [np.zeros(u.shape) for u in velocity[len(grid.axes) :]]
     crossed, stopped, gained = np.zeros((3, 3))
     drunk = [np.zeros(3) for _ in jets]
-    cells = cells_with_inlets(jets, start.sources)
+    cells = cells_with_inlets(jets, start.sources, fluid.sources, grid)
     for axis in grid.axes:
         inlets = inlets_across(axis, cells, jets, start.sources, grid, sides)
         along = np.empty(velocity[axis].shape)
@@ -162,9 +162,7 @@ def store_state(
     grid, sides, volumes = fluid.grid, fluid.boundaries, advected.volumes
     dt, velocity = solved.driven.system.dt, solved.velocity
     world.solid.v[:], world.volumes = solved.v, (cut, volumes)
-    inside = leak_proof(velocity, cut, boundary_velocity(pose, solved.v), grid)
-    for axis in grid.axes:
-        np.copyto(velocity[axis], inside[axis], where=volumes.moving[axis] == 0.0)
+    fill_with_leak_proof(velocity, volumes, cut, boundary_velocity(pose, solved.v), grid)
     volumes.follow(velocity, grid)
     for axis in grid.axes:
         change, acceleration = state.velocity[axis], state.acceleration[axis]
@@ -181,3 +179,20 @@ def store_state(
     state.cell_volume, state.pose = volumes.cells, world.solid.q.copy()
     state.scalars = dyed.scalars
     world.advance_clock(dt)
+
+
+def fill_with_leak_proof(
+    velocity: Faces, volumes: ControlVolumes, cut: Geometry, moving: Array, grid: Grid
+) -> None:
+    """Give faces that no fluid moves with the velocity of the leak-proof field, in place.
+
+    moving  (k,) see `operators.leak_proof`
+    """
+    for axis in grid.axes:
+        u, held = velocity[axis].reshape(-1), volumes.moving[axis].reshape(-1)
+        faces = cut.closed.face[cut.closed.axis == axis]
+        open_ones, empty = faces[held[faces] != 0.0], np.flatnonzero(held == 0.0)
+        kept = u[open_ones]
+        u[empty] *= cut.open[axis].reshape(-1)[empty]
+        add_bodies(velocity[axis], axis, cut, moving)
+        u[open_ones] = kept

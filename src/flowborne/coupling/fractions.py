@@ -214,8 +214,9 @@ def geometry(
     beside = beside_sides(grid, boundaries)
     ox, oy, oz = opened = [np.ones(grid.face_shape(d)) for d in range(3)]
     total = grid.zeros_faces()
-    boxes = body_boxes(shapes, position, rotation, first_skin)
-    pieces = list(around_bodies(shapes, position, rotation, boxes, skins, grid, boundaries))
+    corners = body_boxes(shapes, position, rotation, first_skin)
+    pieces = list(around_bodies(shapes, position, rotation, corners, skins, grid, boundaries))
+    boxes = np.array([piece.box for piece in pieces], np.int64).reshape(-1, 3, 2)
     crossings = together(distance.shape, [piece.crossings for piece in pieces])
     for piece in pieces:
         merge(distance, nearest, piece.distance, piece.box, piece.body)
@@ -242,10 +243,10 @@ def geometry(
     for d in around:
         join_ends(opened[d], d)
     axis, face, part_body, closed, centre = map(np.concatenate, zip(*listed, strict=True))
-    kind = kinds_of_cells(ox, oy, oz, normal)
+    kind = kinds_of_cells(ox, oy, oz, normal, boxes)
     with_rows = kind >= NARROW
     bones = [piece for piece in pieces if piece.body < first_skin]
-    middles = np.concatenate([boxes.mean(axis=1), skins.middle])
+    middles = np.concatenate([corners.mean(axis=1), skins.middle])
     images = Images(periods(grid, boundaries), middles)
     place, index = face_centres(axis, face, grid)
     first = int(np.searchsorted(part_body, first_skin))
@@ -255,10 +256,8 @@ def geometry(
     common = bone_rows([] if boundaries.has_free_side(grid) else bones, kind == COVERED)
     if flat:
         oz[:] = 0.0
-    volume = np.ones(grid.shape)
-    for piece in pieces:
-        open_cells(volume, distance, crossings, ox, oy, oz, piece.box)
-    volume *= grid.cell_volume
+    volume = np.full(grid.shape, grid.cell_volume)
+    open_cells(volume, grid.cell_volume, distance, crossings, (ox, oy, oz), boxes)
     owner, force = rows[2][::6] // 6, rows[3].reshape(-1, 6)[:, :3]
     corner, weight = np.zeros((0, 3), np.int64), np.zeros((0, 3))
     if first < len(face):

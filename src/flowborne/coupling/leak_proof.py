@@ -31,7 +31,7 @@ from flowborne.coupling.fractions import Geometry
 from flowborne.coupling.operators import beyond_sides
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.control_volumes import NONE
-from flowborne.fluid.ghosts import impose_sides
+from flowborne.fluid.ghosts import impose_sides, plane, planes
 from flowborne.fluid.grid import Grid
 from flowborne.fluid.projection import PressureGradient
 from flowborne.kernels.arrays import PERIODIC, PRESCRIBED, Array, Faces, Integers
@@ -87,12 +87,12 @@ def leak_proof_flux(
     beyond = beyond_sides(dipoles, gradient.whole)
     system = PressureSystem(weights, sides.periodic(), beyond=beyond)
     rhs, net = volume_rates(system, start, end, departure.rate, dt), np.empty(grid.shape)
-    net_out(net, *flux)
+    net_out(plane(net, grid), *planes(flux, grid))
     rhs += net
     left = LEFT * grid.cell_volume / dt
     solution = system.solve(-rhs, None, tolerance=TOLERANCE, absolute=left)
     gradient.subtract(flux, solution.pressure, 1.0)
-    net_out(net, *flux)
+    net_out(plane(net, grid), *planes(flux, grid))
     later = start + dt * (departure.rate - net)
     swept.put_back(flux, later, end, dt)
     later[(later == 0.0) & (cells != 0.0)] = FILLED * grid.cell_volume

@@ -24,13 +24,15 @@ from scipy.ndimage import map_coordinates
 
 from flowborne.base.errors import BreakdownError
 from flowborne.coupling.fractions import Geometry
-from flowborne.fluid.boundary import Boundaries
+from flowborne.fluid.boundary import Boundaries, Source, cells_in
+from flowborne.fluid.control_volumes import NONE
 from flowborne.fluid.dye import Brought
 from flowborne.fluid.grid import Grid
 from flowborne.fluid.sides.far import Strength
 from flowborne.fluid.transport import NO_INLETS
 from flowborne.kernels.arrays import Array, Integers, Mask
 from flowborne.kernels.carry import Inlets
+from flowborne.kernels.control_volumes import merged
 from flowborne.solids.dynamics import Kinematics
 
 DEPTH = 3.0
@@ -197,11 +199,22 @@ def jet_wrench(jets: tuple[Jet, ...], density: float, nbody: int) -> Array:
     return wrench
 
 
-def cells_with_inlets(jets: tuple[Jet, ...], sources: Array) -> Integers:
-    """Flat cells into which mouths and sources bring something, ascending."""
-    cells = np.flatnonzero(sources)
+def cells_with_inlets(
+    jets: tuple[Jet, ...], rate: Array, sources: tuple[Source, ...], grid: Grid
+) -> Integers:
+    """Flat cells into which mouths and sources bring something, ascending.
+
+    rate  (nx, ny, nz) what the sources bring, m^3/s
+    """
+    cells = NONE
+    for source in sources:
+        if source.volume_rate is not None:
+            parts = zip(grid.shape, cells_in(source, grid), strict=True)
+            box = np.ix_(*(np.arange(count)[part] for count, part in parts))
+            flat = np.ravel_multi_index(box, grid.shape).ravel()
+            cells = merged(cells, flat[rate.reshape(-1)[flat] != 0.0])[0]
     for jet in jets:
-        cells = np.union1d(cells, jet.cells)
+        cells = merged(cells, jet.cells)[0]
     return cells
 
 
@@ -264,7 +277,11 @@ def at_faces(
         above[axis] %= grid.shape[axis]
     shape = grid.face_shape(axis)
     both = [np.ravel_multi_index(tuple(place), shape) for place in (at, above)]
-    index, which = np.unique(np.concatenate(both), return_inverse=True)
+    lower, upper = both
+    order = np.argsort(upper, kind="stable")  # on a periodic axis the last ones come first
+    index, first, second = merged(lower, upper[order])
+    which = np.concatenate([first, np.empty_like(second)])
+    which[cells.size + order] = second
     sums = [np.bincount(which, np.tile(v, 2), index.size) for v in values]
     return index, [np.asarray(0.5 * total, float) for total in sums]
 
@@ -276,12 +293,13 @@ def brought_by(jets: tuple[Jet, ...], rate: Array, names: tuple[str, ...]) -> Br
     rate   (nx, ny, nz) what all of them bring, m^3/s
     names  of the scalars
     """
-    blown = [jet for jet in jets if jet.rate > 0.0]
-    gain, dye = np.zeros(rate.shape), {name: np.zeros(rate.shape) for name in names}
+    blown, cells = [jet for jet in jets if jet.rate > 0.0], NONE
     for jet in blown:
-        gain.reshape(-1)[jet.cells] += jet.rates
+        cells = merged(cells, jet.cells)[0]
+    gain, dye = np.zeros(cells.size), {name: np.zeros(cells.size) for name in names}
+    for jet in blown:
+        at = np.searchsorted(cells, jet.cells)
+        gain[at] += jet.rates
         for name in names:
-            dye[name].reshape(-1)[jet.cells] += jet.mouth.scalars.get(name, 0.0) * jet.rates
-    cells = np.flatnonzero(gain)
-    amounts = {name: dye[name].reshape(-1)[cells] for name in names}
-    return Brought(rate, cells, gain.reshape(-1)[cells], amounts)
+            dye[name][at] += jet.mouth.scalars.get(name, 0.0) * jet.rates
+    return Brought(rate, cells, gain, dye)

@@ -13,7 +13,7 @@ import numpy as np
 
 from flowborne.coupling.fractions import Geometry
 from flowborne.fluid.dipoles import Dipoles
-from flowborne.fluid.grid import Grid
+from flowborne.fluid.grid import Grid, faces_of
 from flowborne.fluid.projection import PressureGradient
 from flowborne.kernels.arrays import FREE, Array, DenseTerm, Faces
 from flowborne.kernels.coupling_rows import add_body_velocity
@@ -51,12 +51,22 @@ def leak_proof(velocity: Faces, geometry: Geometry, moving: Array, grid: Grid) -
 
     moving  (k,) see `motion`
     """
+    fields = [carried(axis, velocity, geometry, moving) for axis in grid.axes]
+    return faces_of([*fields, *velocity[len(fields) :]])
+
+
+def carried(axis: int, velocity: Faces, geometry: Geometry, moving: Array) -> Array:
+    """Its component along an axis."""
+    field = geometry.open[axis] * velocity[axis]
+    add_bodies(field, axis, geometry, moving)
+    return field
+
+
+def add_bodies(out: Array, axis: int, geometry: Geometry, moving: Array) -> None:
+    """Add closed part x body velocity on the faces across `axis`, in place, for the motion (k,)."""
     first = moving.size - geometry.skins.vertices.size
-    carried = [opened * u for opened, u in zip(geometry.open, velocity, strict=True)]
     twist, flesh = moving[:first].reshape(-1, 6), moving[first:].reshape(-1, 3)
-    for axis in grid.axes:
-        add_body_velocity(carried[axis], axis, geometry.closed, twist, flesh)
-    return carried[0], carried[1], carried[2]
+    add_body_velocity(out, axis, geometry.closed, twist, flesh)
 
 
 def add_flux(out: Array, geometry: Geometry, moving: Array) -> None:

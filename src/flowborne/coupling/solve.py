@@ -29,8 +29,8 @@ from flowborne.coupling.operators import (
     add_flux,
     beyond_sides,
     boundary_velocity,
+    carried,
     generalised,
-    leak_proof,
     pressure_push,
     side_push,
 )
@@ -40,8 +40,8 @@ from flowborne.coupling.world import Fluid, World
 from flowborne.fluid.grid import Grid, faces_of
 from flowborne.fluid.projection import face_weights, pressure_gradient
 from flowborne.kernels.arrays import ROUNDING, Array, Faces, Integers
-from flowborne.kernels.faces import largest_open
-from flowborne.kernels.projection import net_out
+from flowborne.kernels.faces import largest_open, largest_size
+from flowborne.kernels.projection import open_outflow
 from flowborne.solids.driven import Driven, within_limits
 from flowborne.solids.dynamics import Kinematics
 from flowborne.solvers.mobility import Mobility
@@ -185,8 +185,7 @@ def solve_together(
     smooth, viscous, smoothed = diffuse(world, velocity, mass, gradient, cut, jets, pose, driven)
     term = LowRankTerm(cut.rows, mobility)
     net = net_outflow(smooth, cut, rate, fluid)
-    carried = leak_proof(smooth, cut, boundary_velocity(pose, driven.velocity), fluid.grid)
-    floor = rounding_floor(carried, fluid.grid)
+    floor = rounding_floor(smooth, cut, boundary_velocity(pose, driven.velocity), fluid.grid)
     iterations, tried = 0, driven
     for _ in range(PASSES):
         start = boundary_velocity(pose, driven.after(generalised(pose, viscous)))
@@ -300,9 +299,7 @@ def net_outflow(velocity: Faces, cut: Geometry, rate: Array, fluid: Fluid) -> Ar
     rate  (nx, ny, nz) volume that sources and mouths bring into each cell, m^3/s
     """
     net = np.empty(fluid.grid.shape)
-    net_out(net, *(part * u for part, u in zip(cut.open, velocity, strict=True)))
-    net *= fluid.grid.face_area
-    net -= rate
+    open_outflow(net, cut.open, velocity, rate, fluid.grid.face_area)
     return net
 
 
@@ -312,13 +309,13 @@ def largest_divergence(
     """Largest |D u + J v - sources| / volume of a cell, 1/s, for the motion (k,) of the bodies."""
     net = net_outflow(velocity, cut, rate, fluid)
     add_flux(net, cut, moving)
-    return float(np.abs(net).max()) / fluid.grid.cell_volume
+    return largest_size(net) / fluid.grid.cell_volume
 
 
-def rounding_floor(velocity: Faces, grid: Grid) -> float:
+def rounding_floor(velocity: Faces, cut: Geometry, moving: Array, grid: Grid) -> float:
     """Norm over all cells of what rounding leaves of the net outflow, m^3/s.
 
-    velocity  of fluid and bodies: a body that turns displaces less than its faces move
+    Of fluid and bodies in motion (k,): a body that turns displaces less than its faces move.
     """
-    fastest = max(max(float(u.max()), -float(u.min())) for u in velocity)
+    fastest = max(largest_size(carried(axis, velocity, cut, moving)) for axis in grid.axes)
     return float(ROUNDING * grid.face_area * fastest * np.sqrt(np.prod(grid.shape)))

@@ -20,6 +20,7 @@ import numpy as np
 from scipy import fft
 
 from flowborne.fluid.boundary import places
+from flowborne.fluid.ghosts import plane, planes
 from flowborne.fluid.grid import Grid
 from flowborne.fluid.sides.far import Sea
 from flowborne.fluid.sides.side import Place
@@ -189,7 +190,7 @@ def brought(field: Faces, sea: Sea) -> Normal:
     that swells."""
     grid = sea.far[0].grid
     rate = np.empty(grid.shape)
-    net_out(rate, *field)
+    net_out(plane(rate, grid), *planes(field, grid))
     rate *= grid.face_area
     fastest = max(float(np.abs(field[axis]).max()) for axis in grid.axes)
     rate[np.abs(rate) < SOLVED * fastest * grid.face_area] = 0.0

@@ -18,9 +18,10 @@ import numpy as np
 
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.dipoles import Dipoles
+from flowborne.fluid.ghosts import plane
 from flowborne.fluid.grid import Grid, faces_of
 from flowborne.kernels.arrays import Array, Faces
-from flowborne.kernels.faces import accelerate
+from flowborne.kernels.faces import accelerate, weigh
 from flowborne.kernels.projection import subtract_gradient
 
 EVEN = 1e-9
@@ -43,7 +44,10 @@ def accelerated(opened: Faces, mass: Faces, grid: Grid, boundaries: Boundaries) 
 
 def face_weights(opened: Faces, rate: Faces, grid: Grid) -> Faces:
     """Weights w = a A rate of the pressure matrix, of a A / m; see the module."""
-    return faces_of([grid.face_area * o * r for o, r in zip(opened, rate, strict=True)])
+    weights = faces_of([np.empty(o.shape) for o in opened])
+    for weight, part, of_face in zip(weights, opened, rate, strict=True):
+        weigh(weight, part, of_face, grid.face_area)
+    return weights
 
 
 @dataclass(frozen=True)
@@ -64,10 +68,11 @@ class PressureGradient:
     def subtract(self, velocity: Faces, pressure: Array, scale: float) -> None:
         """Subtract scale rate (p_upper - p_lower) on every face, in place; see
         `subtract_gradient`."""
-        periodic = self.boundaries.periodic()
-        for axis in self.grid.axes:
-            rate = self.rate[axis]
-            subtract_gradient(velocity[axis], rate, pressure, axis, scale, periodic[axis])
+        grid, periodic = self.grid, self.boundaries.periodic()
+        p = plane(pressure, grid)
+        for axis in grid.axes:
+            u, rate = plane(velocity[axis], grid), plane(self.rate[axis], grid)
+            subtract_gradient(u, rate, p, axis + grid.is_slab, scale, periodic[axis])
         for place, answer in self.dipoles.answer(pressure) if self.dipoles else ():
             change = scale * self.whole * answer
             velocity[place.axis][place.layer] += change if place.upper else -change

@@ -37,7 +37,7 @@ from flowborne.fluid.ghosts import edge, face_grid, packed_sides, plane, planes
 from flowborne.fluid.grid import Grid
 from flowborne.kernels.arrays import Array, Faces, Integers, Marks
 from flowborne.kernels.carry import Exchange, Inlets, Scratch, Volumes, carry, prepare
-from flowborne.kernels.control_volumes import Transfers
+from flowborne.kernels.control_volumes import Transfers, merged
 from flowborne.kernels.eddies import edges_near, exchange, exchanges
 from flowborne.kernels.flux import GHOSTS, Fluxes, Padded, largest_crossing
 
@@ -162,7 +162,7 @@ def carry_component(
     flux = Fluxes(planes(transport.flux, grid), faces.component, *means)
     given = passed_on(before.transfers[component], after.transfers[component], transport.dt)
     exchange = Exchange(flux, table, inlets, given)
-    cut = np.union1d(before.cut[component], after.cut[component])
+    cut = merged(before.cut[component], after.cut[component])[0]
     out = np.empty(velocity.shape)
     fields = plane(out, grid), plane(velocity, grid), plane(velocity, grid)
     with borrowed(grid, faces.shape.tolist()) as scratch:

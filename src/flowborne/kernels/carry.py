@@ -17,10 +17,12 @@ from flowborne.kernels.control_volumes import (
     Transfers,
     across_axis,
     fill_empty,
+    indices,
     join_small,
     level,
     mark_cut,
     share_velocity,
+    stride,
 )
 from flowborne.kernels.face_masses import add_transfers, give, place_of
 from flowborne.kernels.flux import (
@@ -191,38 +193,34 @@ def mark_volumes(marks: Marks, cut: Integers, sides: Sides, faces: FaceGrid) -> 
 
 
 @njit(nogil=True, cache=True)
-def side_rates(flux: Fluxes, index: Integers, shape: Integers) -> Array:
-    """(n, 6) volume per time that leaves control volumes through their sides: 2 axis for the lower
-    one, 2 axis + 1 for the upper one."""
-    rate, at, side = np.zeros((index.size, 6)), np.empty(3, np.int64), np.empty(3, np.int64)
-    component = flux.component
-    for n in range(index.size):
-        f = index[n]
-        at[0], at[1], at[2] = f // (shape[1] * shape[2]), (f // shape[2]) % shape[1], f % shape[2]
-        for axis in range(3):
-            if shape[axis] == 1:
-                continue
-            q, own = across_axis(flux.through, axis), int(axis == component)
-            for upper in range(2):
-                side[:] = at
-                side[axis] += upper
-                line = side[component]
-                for one in range(2):
-                    side[component] = flux.place[own, line, one]
-                    through = flux.share[own, line, one] * q[side[0], side[1], side[2]]
-                    rate[n, 2 * axis + upper] += (2 * upper - 1) * through
-    return rate
+def add_side_rates(
+    total: Array, flux: Fluxes, axis: int, listed: Integers, shape: Integers
+) -> None:
+    """Add volume per time that leaves listed control volumes through their sides across an axis,
+    in place."""
+    q, component = across_axis(flux.through, axis), flux.component
+    own, through = int(axis == component), q.reshape(-1)
+    place, share = flux.place[own], flux.share[own]
+    along, step = stride(q.shape, component), stride(q.shape, axis)
+    for n in range(listed.size):
+        i, j, k = at = indices(shape, listed[n])
+        first = (i * q.shape[1] + j) * q.shape[2] + k - at[component] * along
+        for upper in range(2):
+            line = at[component] + upper * own
+            begin = first + upper * step * (1 - own)
+            rate = share[line, 0] * through[begin + place[line, 0] * along]
+            rate += share[line, 1] * through[begin + place[line, 1] * along]
+            total[n] += max((2 * upper - 1) * rate, 0.0)
 
 
 @njit(nogil=True, cache=True)
 def what_flows_out(exchange: Exchange, listed: Integers, shape: Integers) -> Array:
     """(n,) volume per time that leaves listed control volumes through their sides, inlets and
     transfers."""
-    rate, total = side_rates(exchange.flux, listed, shape), np.zeros(listed.size)
-    inlets, given = exchange.inlets, exchange.given
-    for n in range(listed.size):
-        for way in range(6):
-            total[n] += max(rate[n, way], 0.0)
+    total, inlets, given = np.zeros(listed.size), exchange.inlets, exchange.given
+    for axis in range(3):
+        if shape[axis] > 1:
+            add_side_rates(total, exchange.flux, axis, listed, shape)
     for faces, out, sign in (
         (inlets.faces, inlets.loss, 1.0),
         (given.givers, given.volume, 1.0),
@@ -251,26 +249,25 @@ def cross_sides(sides: Sides, flux: Fluxes, cells: Array, faces: FaceGrid) -> No
             continue
         q, total = across_axis(flux.through, axis), 0.0
         one, other = int(axis == 0), 2 - int(axis == 2)
-        count = shape[one] * shape[other]
-        for n in range(count):
-            at[one], at[other] = n // shape[other], n % shape[other]
-            at[axis] = upper * (shape[axis] - 1)
-            line, through, held = at[component], 0.0, 0.0
-            if wraps[component] > 0 and line == wraps[component]:
-                continue
-            for m in range(2):
-                at[component], part = flux.place[0, line, m], flux.share[0, line, m]
-                at[axis] = min(at[axis], cells.shape[axis] - 1)
-                held += part * cells[at[0], at[1], at[2]]
-                at[axis] = upper * (q.shape[axis] - 1)
-                if axis != component:
-                    through += part * q[at[0], at[1], at[2]]
-            if axis == component:
-                through = q[at[0], at[1], at[2]]
-            sides.rate[first + n] = (1.0 - 2.0 * upper) * through
-            sides.share[first + n] = held
-            total += held
-        sides.share[first : first + count] /= max(total, 1e-300)
+        for a in range(shape[one]):
+            for b in range(shape[other]):
+                at[one], at[other], at[axis] = a, b, upper * (shape[axis] - 1)
+                line, n, through, held = at[component], first + a * shape[other] + b, 0.0, 0.0
+                if wraps[component] > 0 and line == wraps[component]:
+                    continue
+                for m in range(2):
+                    at[component], part = flux.place[0, line, m], flux.share[0, line, m]
+                    at[axis] = min(at[axis], cells.shape[axis] - 1)
+                    held += part * cells[at[0], at[1], at[2]]
+                    at[axis] = upper * (q.shape[axis] - 1)
+                    if axis != component:
+                        through += part * q[at[0], at[1], at[2]]
+                if axis == component:
+                    through = q[at[0], at[1], at[2]]
+                sides.rate[n] = (1.0 - 2.0 * upper) * through
+                sides.share[n] = held
+                total += held
+        sides.share[first : first + shape[one] * shape[other]] /= max(total, 1e-300)
 
 
 @njit(nogil=True, cache=True)
@@ -424,7 +421,7 @@ def pass_inlets(now: Stage, padded: Array, inlets: Inlets, own: Array) -> None:
     flat, shape = in_line(now), now.later.shape
     for n in range(own.size):
         f = inlets.faces[n]
-        i, j, k = f // (shape[1] * shape[2]), (f // shape[2]) % shape[1], f % shape[2]
+        i, j, k = indices(shape, f)
         i += (padded.shape[0] - shape[0]) // 2
         own[n] = inlets.loss[n] * padded[i, j + GHOSTS, k + GHOSTS]
         give(flat, f, own[n] - inlets.gain[n] * inlets.velocity[n])

@@ -13,7 +13,14 @@ from numba import njit
 
 from flowborne.kernels.arrays import PERIODIC, PRESCRIBED, Array, Faces, Integers, Nodes
 from flowborne.kernels.control_volumes import across_axis
-from flowborne.kernels.cut_faces import closed_face, crossing_from, is_cut, nodes_inside, other_axes
+from flowborne.kernels.cut_faces import (
+    closed_face,
+    crossing_from,
+    is_cut,
+    nodes_inside,
+    on_several_pieces,
+    other_axes,
+)
 from flowborne.kernels.edge_crossings import Crossings
 from flowborne.kernels.jit import inlined
 
@@ -184,7 +191,8 @@ def wall_point(
                 j + side * int(axis == 1),
                 k + side * int(axis == 2),
             )
-            if is_cut(distance, found, axis, a, b, c):
+            face = axis, a, b, c
+            if is_cut(distance, found, *face) and on_several_pieces(distance, found, *face):
                 _, _, _, count, x, y = closed_face(distance, found, axis, a, b, c, False, False)
                 corners += count
                 middle[axis] += side * count
@@ -223,39 +231,49 @@ def wall_point(
 
 @njit(nogil=True, cache=True)
 def open_cells(
-    part: Array, distance: Array, found: Crossings, ox: Array, oy: Array, oz: Array, box: Integers
+    volume: Array, whole: float, distance: Array, found: Crossings, opened: Faces, boxes: Integers
 ) -> None:
-    """Open part of the cells in a box of nodes; 0 where all faces of a cell are closed.
+    """Open volume of the cells in boxes of nodes; 0 where all faces of a cell are closed.
 
-    In a slab that of its cross-section, the open part of its faces across z; else the sum of the
+    In a slab that over its cross-section, the open part of its faces across z; else the sum of the
     pyramids from a point of the wall over the open parts of the faces: its own triangles add none.
 
-    part        (nx, ny, nz), overwritten in the box
-    distance    to the bodies at the nodes;  found  where edges cross these
-    ox, oy, oz  open parts of the faces
+    volume    (nx, ny, nz), overwritten in the boxes
+    whole     that of a whole cell
+    distance  to the bodies at the nodes;  found  where edges cross these
+    opened    open parts of the faces
+    boxes     (n, 3, 2)
     """
-    flat = part.shape[2] == 1
+    (ox, oy, oz), flat, todo = opened, volume.shape[2] == 1, -1.0
     point, scratch = np.empty(3), np.empty((3, 3))
-    for i in range(box[0, 0], box[0, 1] - 1):
-        for j in range(box[1, 0], box[1, 1] - 1):
-            for k in range(box[2, 0], box[2, 1] - 1):
-                shut = 4.0 - ox[i, j, k] - ox[i + 1, j, k] - oy[i, j, k] - oy[i, j + 1, k]
-                if not flat:
-                    shut += 2.0 - oz[i, j, k] - oz[i, j, k + 1]
-                inside = nodes_inside(distance, 0, i, j, k) + nodes_inside(distance, 0, i + 1, j, k)
-                if shut == (4.0 if flat else 6.0) or inside == 8:
-                    part[i, j, k] = 0.0
-                elif inside == 0 and shut == 0.0:
-                    part[i, j, k] = 1.0
-                elif flat:
-                    part[i, j, k] = 1.0 - closed_face(distance, found, 2, i, j, k, True, False)[0]
-                elif not wall_point(distance, found, i, j, k, point, scratch):
-                    part[i, j, k] = 1.0
-                else:
-                    x, y, z = point
-                    volume = (
-                        x * ox[i, j, k] + (1.0 - x) * ox[i + 1, j, k]
-                        + y * oy[i, j, k] + (1.0 - y) * oy[i, j + 1, k]
-                        + z * oz[i, j, k] + (1.0 - z) * oz[i, j, k + 1]
-                    ) / 3.0  # fmt: skip
-                    part[i, j, k] = min(max(volume, 0.0), 1.0)
+    for box in boxes:
+        volume[box[0, 0] : box[0, 1] - 1, box[1, 0] : box[1, 1] - 1, box[2, 0] : box[2, 1] - 1] = (
+            todo
+        )
+    for box in boxes:
+        for i in range(box[0, 0], box[0, 1] - 1):
+            for j in range(box[1, 0], box[1, 1] - 1):
+                for k in range(box[2, 0], box[2, 1] - 1):
+                    if volume[i, j, k] != todo:
+                        continue
+                    shut = 4.0 - ox[i, j, k] - ox[i + 1, j, k] - oy[i, j, k] - oy[i, j + 1, k]
+                    if not flat:
+                        shut += 2.0 - oz[i, j, k] - oz[i, j, k + 1]
+                    inside = nodes_inside(distance, 0, i, j, k)
+                    inside += nodes_inside(distance, 0, i + 1, j, k)
+                    part = 1.0
+                    if shut == (4.0 if flat else 6.0) or inside == 8:
+                        part = 0.0
+                    elif inside == 0 and shut == 0.0:
+                        part = 1.0
+                    elif flat:
+                        part = 1.0 - closed_face(distance, found, 2, i, j, k, True, False)[0]
+                    elif wall_point(distance, found, i, j, k, point, scratch):
+                        x, y, z = point
+                        part = (
+                            x * ox[i, j, k] + (1.0 - x) * ox[i + 1, j, k]
+                            + y * oy[i, j, k] + (1.0 - y) * oy[i, j + 1, k]
+                            + z * oz[i, j, k] + (1.0 - z) * oz[i, j, k + 1]
+                        ) / 3.0  # fmt: skip
+                        part = min(max(part, 0.0), 1.0)
+                    volume[i, j, k] = part * whole

@@ -172,21 +172,26 @@ def solve(
     vectors: Vectors,
     tolerance: float,
     absolute: float,
+    guessed: bool,
 ) -> tuple[int, float, bool]:
     """Solve A x = rhs from the guess in x; all of it on one thread, or on all.
 
     vectors  padded x and rhs, scratch r, p, q with ghosts 0; rhs loses its part along the null
              vectors, x as well at the end
+    guessed  whether x is other than 0
     returns  iterations, |rhs - A x| / |rhs|, whether the residual asked for was reached
     """
     finest, rows, mobility, beyond, label, null = matrix
     hierarchy, cycle, fields, amounts = preconditioner
     table, periodic = hierarchy[0], hierarchy[1]
     x, rhs, r, p, q = vectors
-    norm0 = np.sqrt(dot(rhs, rhs))
-    remove_null(rhs, label, null)
-    norm = np.sqrt(dot(rhs, rhs))
-    goal = max(tolerance * norm, absolute, ROUNDING * norm0)
+    square = dot(rhs, rhs)
+    rounding = ROUNDING * np.sqrt(square)
+    if null.size:
+        remove_null(rhs, label, null)
+        square = dot(rhs, rhs)
+    norm = np.sqrt(square)
+    goal = max(tolerance * norm, absolute, rounding)
     residual, last = 0.0, np.inf
     z, b = at_level(cycle[0], table, 0), at_level(cycle[1], table, 0)
     ring = periodic.any()
@@ -195,7 +200,6 @@ def solve(
     if not norm > goal:
         x[:] = 0.0
         return 0, 1.0 if norm > 0.0 else norm, norm <= goal
-    guessed = dot(x, x) > 0.0
     while True:
         if guessed or iterations:
             remove_null(x, label, null)
@@ -203,11 +207,12 @@ def solve(
             apply_laplacian(q, x, finest)
             apply_low_rank(q, x, rows, mobility)
             add_term(q, x, *beyond)
-            true_residual(r, rhs, q)
-            remove_null(r, label, null)
+            square = true_residual(r, rhs, q)
+            if null.size:
+                remove_null(r, label, null)
+                square = dot(r, r)
         else:
             scaled(rhs, r, 1.0)
-        square = dot(r, r)
         residual = np.sqrt(square)
         converged = residual <= goal
         if converged or not residual < STAGNATION * last or iterations >= LIMIT:

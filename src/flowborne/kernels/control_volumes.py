@@ -59,29 +59,59 @@ def across_axis(faces: Faces, axis: int) -> Array:
     return faces[1] if axis == 1 else faces[2]
 
 
-@njit(nogil=True, cache=True)
-def neighbour(shape: Integers, wraps: Integers, f: int, way: int) -> int:
-    """Flat index of the control volume beside f; -1 beyond the domain, and along an axis of one
-    layer.
+@inlined
+def indices(shape: Integers, f: int) -> tuple[int, int, int]:
+    """(i, j, k) of a flat index; divided in 32 bits, as 64 take longer."""
+    row = int(np.int64(np.uint32(f) // np.uint32(shape[2])))
+    i = int(np.int64(np.uint32(row) // np.uint32(shape[1])))
+    return i, row - i * shape[1], f - row * shape[2]
+
+
+@inlined
+def stride(shape: Integers, axis: int) -> int:
+    """Places between neighbours along an axis in a flat field."""
+    return shape[1] * shape[2] if axis == 0 else (shape[2] if axis == 1 else 1)
+
+
+@inlined
+def both_beside(f: int, at: int, step: int, count: int, ring: int) -> tuple[int, int]:
+    """Flat indices of the control volumes below and above f along an axis; -1 beyond the domain,
+    and along an axis of one layer.
+
+    at     index of f along the axis
+    step   between neighbours there
+    count  of the layers
+    ring   number of distinct ones along a periodic axis, else 0
+    """
+    below, above = f - step, f + step
+    if ring > 0:
+        below += step * ring * int(at == 0)
+        above -= step * ring * int(at + 1 >= ring)
+    else:
+        below = below if at > 0 else -1
+        above = above if at + 1 < count else -1
+    return (below, above) if count > 1 else (-1, -1)
+
+
+@inlined
+def find_beside(beside: Integers, shape: Integers, wraps: Integers, f: int) -> None:
+    """Set `beside` (6,) to the flat indices of the control volumes beside f: 2 axis for the one
+    below, 2 axis + 1 for the one above, see `both_beside`.
 
     wraps  (3,) number of distinct volumes along each periodic axis, else 0
-    way    2 axis below f, 2 axis + 1 above
     """
-    axis, side = way // 2, 2 * (way % 2) - 1
-    if shape[axis] == 1:
-        return -1
-    n1, n2 = shape[1], shape[2]
-    at = f // (n1 * n2) if axis == 0 else ((f // n2) % n1 if axis == 1 else f % n2)
-    step = n1 * n2 if axis == 0 else (n2 if axis == 1 else 1)
-    to = at + side
-    if wraps[axis] > 0:
-        if to < 0:
-            return int(f + step * (wraps[axis] - 1))
-        if to >= wraps[axis]:
-            return int(f - step * at + step * (to - wraps[axis]))
-    elif to < 0 or to >= shape[axis]:
-        return -1
-    return int(f + step * side)
+    i, j, k = indices(shape, f)
+    beside[0], beside[1] = both_beside(f, i, shape[1] * shape[2], shape[0], wraps[0])
+    beside[2], beside[3] = both_beside(f, j, shape[2], shape[1], wraps[1])
+    beside[4], beside[5] = both_beside(f, k, 1, shape[2], wraps[2])
+
+
+@njit(nogil=True, cache=True)
+def neighbour(shape: Integers, wraps: Integers, f: int, way: int) -> int:
+    """Flat index of one control volume beside f; `way` as in `find_beside`."""
+    beside = np.empty(6, np.int64)
+    find_beside(beside, shape, wraps, f)
+    return int(beside[way])
 
 
 @njit(nogil=True, cache=True)
@@ -90,9 +120,11 @@ def place_of(listed: Integers, f: int, near: int) -> int:
     little after the place `near`."""
     low, high = 0, listed.size
     if near == 0 or listed[near - 1] < f:
-        low, high = near, min(near + AHEAD, listed.size)
-        if high < listed.size and listed[high] < f:
-            low, high = high, listed.size
+        low, stop = near, min(near + AHEAD, high)
+        while low < stop and listed[low] < f:
+            low += 1
+        if low < stop or low == high:
+            return low
     while low < high:
         middle = (low + high) // 2
         if listed[middle] < f:
@@ -100,6 +132,26 @@ def place_of(listed: Integers, f: int, near: int) -> int:
         else:
             high = middle
     return low
+
+
+@njit(nogil=True, cache=True)
+def merged(one: Integers, other: Integers) -> tuple[Integers, Integers, Integers]:
+    """What is in one of two lists in ascending order or in both, in one such list; and where in it
+    the elements of each are."""
+    found, a, b, count = np.empty(one.size + other.size, np.int64), 0, 0, 0
+    first, second = np.empty(one.size, np.int64), np.empty(other.size, np.int64)
+    while a < one.size or b < other.size:
+        beyond = b == other.size or (a < one.size and one[a] < other[b])
+        both = not beyond and a < one.size and one[a] == other[b]
+        found[count] = one[a] if beyond else other[b]
+        if beyond or both:
+            first[a] = count
+            a += 1
+        if not beyond:
+            second[b] = count
+            b += 1
+        count += 1
+    return found[:count].copy(), first, second
 
 
 @njit(nogil=True, cache=True)
@@ -122,13 +174,13 @@ def find_targets(
     """
     targets, parts = np.empty((small.size, 2), np.int64), np.zeros((small.size, 2))
     (component, shape, wraps), cell_shape = faces, np.array(cells.shape)
-    volume_flat = volumes.reshape(-1)
+    volume_flat, beside = volumes.reshape(-1), np.empty(6, np.int64)
     open_flat, cell_flat, pushed = opened.reshape(-1), cells.reshape(-1), kinds.reshape(-1)
     for n in range(small.size):
         f = small[n]
         targets[n, :] = f
-        n1, n2 = shape[1], shape[2]
-        i, j, k = f // (n1 * n2), (f // n2) % n1, f % n2
+        i, j, k = indices(shape, f)
+        find_beside(beside, shape, wraps, f)
         for side in range(2):
             a = i - int(component == 0 and side == 0)
             b = j - int(component == 1 and side == 0)
@@ -143,7 +195,7 @@ def find_targets(
             outside = a < 0 or b < 0 or c < 0
             if outside or a >= cell_shape[0] or b >= cell_shape[1] or c >= cell_shape[2]:
                 continue
-            to = neighbour(shape, wraps, f, 2 * component + side)
+            to = beside[2 * component + side]
             volume = cell_flat[(a * cell_shape[1] + b) * cell_shape[2] + c]
             if to >= 0 and pushed[to] & DRIVEN and volume > 0.0:
                 targets[n, side], parts[n, side] = to, open_flat[to] * volume
@@ -152,8 +204,7 @@ def find_targets(
             parts[n] /= total
             continue
         most = 0.0
-        for way in range(6):
-            to = neighbour(shape, wraps, f, way)
+        for to in beside:
             if to >= 0 and pushed[to] & DRIVEN and volume_flat[to] > most:
                 targets[n, 0], parts[n, 0], most = to, 1.0, volume_flat[to]
     led = True
@@ -163,8 +214,8 @@ def find_targets(
             if given[n, 0] + given[n, 1] > 0.0:
                 continue
             most = -1.0
-            for way in range(6):
-                to = neighbour(shape, wraps, small[n], way)
+            find_beside(beside, shape, wraps, small[n])
+            for to in beside:
                 at = place_of(small, to, 0) if to >= 0 else small.size
                 if at == small.size or small[at] != to or given[at, 0] + given[at, 1] == 0.0:
                     continue
@@ -215,14 +266,14 @@ def fill_empty(
     field: Array, volumes: Array, listed: Integers, nothing: float, faces: FaceGrid
 ) -> None:
     """Give listed control volumes that hold nothing the mean of those beside them, in place."""
-    flat, volume = field.reshape(-1), volumes.reshape(-1)
+    flat, volume, beside = field.reshape(-1), volumes.reshape(-1), np.empty(6, np.int64)
     for n in range(listed.size):
         f = listed[n]
         if volume[f] > nothing:
             continue
         total, weight = 0.0, 0.0
-        for way in range(6):
-            to = neighbour(faces.shape, faces.wraps, f, way)
+        find_beside(beside, faces.shape, faces.wraps, f)
+        for to in beside:
             if to >= 0 and volume[to] > nothing:
                 total += volume[to] * flat[to]
                 weight += volume[to]
@@ -254,14 +305,15 @@ def level(
     flat, volume, total = field.reshape(-1), volumes.reshape(-1), nought.reshape(-1)
     found, count = np.empty((2, listed.size), np.int64), 0
     part, whole, exchange = np.empty(listed.size), np.empty(listed.size), np.empty(listed.size)
+    beside = np.empty(6, np.int64)
     for n in range(listed.size):
         f = listed[n]
         own = volume[f]
         if own <= nothing or leaving[n] <= 2.0 * own:
             continue
-        best, largest = -1, own
-        for way in range(6):
-            to = neighbour(faces.shape, faces.wraps, f, way)
+        best, largest = np.int64(-1), own
+        find_beside(beside, faces.shape, faces.wraps, f)
+        for to in beside:
             if to >= 0 and volume[to] > largest:
                 best, largest = to, volume[to]
         if best >= 0:
@@ -307,11 +359,10 @@ def mark_cut(marks: Marks, listed: Integers, shape: Integers, wraps: Integers, r
     d0, d1 = (marks.shape[0] - shape[0]) // 2, (marks.shape[1] - n1) // 2
     d2 = (marks.shape[2] - n2) // 2
     for f in listed:
-        at = (f // (n1 * n2), (f // n2) % n1, f % n2)
+        at = indices(shape, f)
         own = ((at[0] + d0) * marks.shape[1] + at[1] + d1) * marks.shape[2] + at[2] + d2
         for axis in range(3):
-            step = marks.shape[1] * marks.shape[2] if axis == 0 else 1
-            step = marks.shape[2] if axis == 1 else step
+            step = stride(marks.shape, axis)
             for shift in range(-reach, reach + 1):
                 for image in range(-1, 2) if wraps[axis] > 0 else range(0, 1):
                     away = shift + image * wraps[axis]

@@ -6,11 +6,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 
 from flowborne.kernels.arrays import PRESCRIBED, Array, Integers, Kinds, Mask, Rows
 from flowborne.kernels.closed_fractions import Piece
-from flowborne.kernels.jit import inlined, kernel
+from flowborne.kernels.jit import inlined
 
 ENCLOSED, COVERED, NARROW, WIDE = 0, 1, 2, 3
 """Kinds of cells: closed in by bodies and solid sides of the domain; all faces closed by bodies; an
@@ -43,34 +43,36 @@ def through(normal: Integers, axis: int, end: int, at_end: bool) -> float:
     return 0.0 if at_end and normal[axis, end] == PRESCRIBED else 1.0
 
 
-@kernel
-def kinds_of_cells(ox: Array, oy: Array, oz: Array, normal: Integers) -> Kinds:
-    """(nx, ny, nz) kind of each cell.
+@njit(nogil=True, cache=True)
+def kinds_of_cells(ox: Array, oy: Array, oz: Array, normal: Integers, boxes: Integers) -> Kinds:
+    """(nx, ny, nz) kind of each cell; WIDE outside boxes of nodes (n, 3, 2), where all faces are
+    open.
 
     normal  (3, 2) a of the velocity across the sides, see `fluid.sides.side`
     """
     n0, n1, n2 = oy.shape[0], ox.shape[1], ox.shape[2]
-    kind = np.empty((n0, n1, n2), np.int8)
+    kind = np.full((n0, n1, n2), WIDE, np.int8)
     first, last = through(normal, 2, 0, True), through(normal, 2, 1, True)
-    for i in prange(n0):
-        below0 = through(normal, 0, 0, i == 0)
-        above0 = through(normal, 0, 1, i == n0 - 1)
-        for j in range(n1):
-            below1 = through(normal, 1, 0, j == 0)
-            above1 = through(normal, 1, 1, j == n1 - 1)
-            beside = below0 + above0 + below1 + above1 < 4.0
-            for k in range(n2):
-                widest = max(below0 * ox[i, j, k], above0 * ox[i + 1, j, k])
-                widest = max(widest, max(below1 * oy[i, j, k], above1 * oy[i, j + 1, k]))
-                at_side = beside
-                if n2 > 1:
-                    below2 = first if k == 0 else 1.0
-                    above2 = last if k == n2 - 1 else 1.0
-                    widest = max(widest, max(below2 * oz[i, j, k], above2 * oz[i, j, k + 1]))
-                    at_side = beside or below2 + above2 < 2.0
-                opened = WIDE if widest >= 0.5 else NARROW
-                shut = ENCLOSED if at_side else COVERED
-                kind[i, j, k] = opened if widest > 0.0 else shut
+    for box in boxes:
+        for i in range(box[0, 0], box[0, 1] - 1):
+            below0 = through(normal, 0, 0, i == 0)
+            above0 = through(normal, 0, 1, i == n0 - 1)
+            for j in range(box[1, 0], box[1, 1] - 1):
+                below1 = through(normal, 1, 0, j == 0)
+                above1 = through(normal, 1, 1, j == n1 - 1)
+                beside = below0 + above0 + below1 + above1 < 4.0
+                for k in range(box[2, 0], box[2, 1] - 1):
+                    widest = max(below0 * ox[i, j, k], above0 * ox[i + 1, j, k])
+                    widest = max(widest, max(below1 * oy[i, j, k], above1 * oy[i, j + 1, k]))
+                    at_side = beside
+                    if n2 > 1:
+                        below2 = first if k == 0 else 1.0
+                        above2 = last if k == n2 - 1 else 1.0
+                        widest = max(widest, max(below2 * oz[i, j, k], above2 * oz[i, j, k + 1]))
+                        at_side = beside or below2 + above2 < 2.0
+                    opened = WIDE if widest >= 0.5 else NARROW
+                    shut = ENCLOSED if at_side else COVERED
+                    kind[i, j, k] = opened if widest > 0.0 else shut
     return kind
 
 

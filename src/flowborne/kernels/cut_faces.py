@@ -209,6 +209,21 @@ def of_one_geometry(listed: Integers, found: Crossings) -> bool:
     return True
 
 
+@inlined
+def on_several_pieces(phi: Array, found: Crossings, axis: int, i: int, j: int, k: int) -> bool:
+    """Whether the crossings around face (i, j, k) across `axis` are on more than one smooth piece:
+    elsewhere the wall has no corner on it."""
+    values, crossing, first = values_at(phi, axis, i, j, k), edges_of(axis, i, j, k, found), -1
+    for n in range(4):
+        e = crossing[n]
+        twice = values[n] >= 0.0 and values[(n + 1) % 4] >= 0.0
+        for m in range(e, e + 1 + int(twice) if e >= 0 else e):
+            if first >= 0 and found.piece[m] != found.piece[first]:
+                return True
+            first = m
+    return False
+
+
 @njit(nogil=True, cache=True)
 def closed_face(
     phi: Array, found: Crossings, axis: int, i: int, j: int, k: int, flat: bool, straight: bool

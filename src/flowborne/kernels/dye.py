@@ -22,7 +22,7 @@ import numpy as np
 from numba import njit, prange
 
 from flowborne.kernels.arrays import ROUNDING, Array, Faces, Integers, Marks
-from flowborne.kernels.control_volumes import neighbour, place_of
+from flowborne.kernels.control_volumes import both_beside, indices, place_of, stride
 from flowborne.kernels.jit import inlined, kernel
 
 WIDTH = 64
@@ -220,12 +220,9 @@ class CutCells(NamedTuple):
 @njit(nogil=True, cache=True)
 def face_of(shape: Integers, axis: int, f: int, upper: int) -> int:
     """Flat index of the lower or upper face of cell f among the faces across an axis."""
-    n1, n2 = shape[1], shape[2]
-    if axis == 0:
-        return int(f + upper * n1 * n2)
-    if axis == 1:
-        return int(f + (f // (n1 * n2) + upper) * n2)
-    return int(f + f // n2 + upper)
+    i, j, _ = indices(shape, f)
+    before = 0 if axis == 0 else (i if axis == 1 else i * shape[1] + j)
+    return int(f + (before + upper) * stride(shape, axis))
 
 
 @njit(nogil=True, cache=True)
@@ -238,13 +235,17 @@ def list_flows(cells: CutCells, axis: int, flux: Array, wraps: Integers, shape: 
     shape  (3,) of the cells
     """
     (listed, beside, row, out), through = cells, flux.reshape(-1)
+    near = np.zeros(2, np.int64)
+    step, count, ring = stride(shape, axis), shape[axis], wraps[axis]
     for n in range(listed.size):
+        at, first = indices(shape, listed[n])[axis], face_of(shape, axis, listed[n], 0)
+        both = both_beside(listed[n], at, step, count, ring)
         for upper in range(2):
-            way, to = 2 * axis + upper, neighbour(shape, wraps, listed[n], 2 * axis + upper)
+            way, to = 2 * axis + upper, both[upper]
             beside[n, way] = to
-            at = place_of(listed, to, 0)
-            row[n, way] = at if to >= 0 and at < listed.size and listed[at] == to else -1
-            out[n, way] = (2.0 * upper - 1.0) * through[face_of(shape, axis, listed[n], upper)]
+            m = near[upper] = place_of(listed, to, near[upper])
+            row[n, way] = m if to >= 0 and m < listed.size and listed[m] == to else -1
+            out[n, way] = (2.0 * upper - 1.0) * through[first + upper * step]
     for n in range(listed.size):
         for upper in range(2):
             through[face_of(shape, axis, listed[n], upper)] = 0.0

@@ -5,6 +5,7 @@ There a stencil needs no weights from memory, which is what an iteration waits f
 
 from __future__ import annotations
 
+import numpy as np
 from numba import prange
 
 from flowborne.kernels.arrays import Marks, Periodic, Real, Triple
@@ -29,6 +30,15 @@ def at_cell(values: Real, cell: int) -> float:
 @inlined
 def differ(a: float, b: float, rounding: float) -> bool:
     return abs(a - b) > rounding * b
+
+
+@inlined
+def differs(w: Real, i: int, j: int, first: int, common: float, rounding: float) -> bool:
+    """Whether some weight of row (i, j) from `first` on is another one than the common one."""
+    found = 0
+    for k in range(first, w.shape[2] - 1):
+        found += int(abs(w[i, j, k] - common) > rounding * common)
+    return found > 0
 
 
 @inlined
@@ -70,21 +80,22 @@ def find_even(w: Triple, periodic: Periodic, even: Marks, rounding: float) -> in
     if a < 0:
         return 0
     c0, c1, c2 = w0[a, b, c], w1[a, b, c], w2[a, b, c]
-    for i in prange(w0.shape[0] - 2 * d):
-        m = i + d
-        before0 = d and (periodic[0] or m > d)
-        after0 = d and (periodic[0] or m < w0.shape[0] - 2)
+    others = np.zeros((3, w0.shape[0], n1 + 2), np.bool_)  # rows of faces with other weights
+    for m in prange(w0.shape[0]):
+        for j in range(1, n1 + 2):
+            others[0, m, j] = d > 0 and differs(w0, m, j, 1, c0, rounding)
+            others[1, m, j] = differs(w1, m, j, 1, c1, rounding)
+            others[2, m, j] = differs(w2, m, j, 2, c2, rounding)
+            if periodic[2]:
+                others[2, m, j] |= differ(w2[m, j, 1], c2, rounding)
+                others[2, m, j] |= differ(w2[m, j, n2 + 1], c2, rounding)
+    for m in range(d, w0.shape[0] - d):
         for j in range(1, n1 + 1):
-            before1, after1 = periodic[1] or j > 1, periodic[1] or j < n1
-            other = periodic[2] and differ(w2[m, j, 1], c2, rounding)
-            other = other or (periodic[2] and differ(w2[m, j, n2 + 1], c2, rounding))
-            for k in range(1, n2 + 1):
-                other |= before0 and differ(w0[m, j, k], c0, rounding)
-                other |= after0 and differ(w0[m + 1, j, k], c0, rounding)
-                other |= before1 and differ(w1[m, j, k], c1, rounding)
-                other |= after1 and differ(w1[m, j + 1, k], c1, rounding)
-                other |= k > 1 and differ(w2[m, j, k], c2, rounding)
-                if other:
-                    break
+            other = others[2, m, j] or (others[0, m, j] and (periodic[0] or m > d))
+            other = other or (others[1, m, j] and (periodic[1] or j > 1))
+            other = other or (others[1, m, j + 1] and (periodic[1] or j < n1))
+            if d:
+                last = m == w0.shape[0] - 2 and not periodic[0]
+                other = other or (others[0, m + 1, j] and not last)
             even[m, j] = 0 if other else 1
     return (a * w0.shape[1] + b) * w0.shape[2] + c

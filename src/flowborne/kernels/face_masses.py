@@ -18,11 +18,15 @@ from flowborne.kernels.control_volumes import (
     Closed,
     Transfers,
     across_axis,
+    both_beside,
+    find_beside,
+    indices,
     merge_small,
-    neighbour,
     place_of,
+    stride,
 )
 from flowborne.kernels.flux import Stage, in_line
+from flowborne.kernels.jit import inlined
 
 KEPT = 0.5
 """Part of the smaller of what one holds and of a h^3 that it keeps at least in a sweep."""
@@ -48,39 +52,38 @@ class Openings(NamedTuple):
     rest: Array
 
 
-@njit(nogil=True, cache=True)
-def cell_beside(f: int, way: int, faces: FaceGrid) -> int:
-    """Flat index of the cell on one side of face f of a component; -1 beyond the domain."""
+@inlined
+def cell_beside(at: tuple[int, int, int], upper: int, faces: FaceGrid) -> int:
+    """Flat index of the cell below or above the face at (i, j, k) of a component; -1 beyond the
+    domain."""
     component, shape, wraps = faces
-    n1, n2 = shape[1], shape[2]
-    i, j, k = f // (n1 * n2), (f // n2) % n1, f % n2
-    at = (i, j, k)[component] - 1 + way % 2
-    count = shape[component] - 1
+    (i, j, k), n1, n2, count = at, shape[1], shape[2], shape[component] - 1
+    place = at[component] - 1 + upper
     if wraps[component] > 0:
-        at %= count
-    elif at < 0 or at >= count:
+        place += count * (int(place < 0) - int(place >= count))
+    elif place < 0 or place >= count:
         return -1
     if component == 0:
-        return int((at * n1 + j) * n2 + k)
+        return int((place * n1 + j) * n2 + k)
     if component == 1:
-        return int((i * (n1 - 1) + at) * n2 + k)
-    return int((i * n1 + j) * (n2 - 1) + at)
+        return int((i * (n1 - 1) + place) * n2 + k)
+    return int((i * n1 + j) * (n2 - 1) + place)
 
 
-@njit(nogil=True, cache=True)
-def face_between(f: int, way: int, low: int, faces: FaceGrid, across: Integers) -> int:
-    """Flat index of one of the two faces between control volume f and the one beside it along
-    another axis: that at the lower (0) or upper (1) of its cells; -1 beyond the domain.
+@inlined
+def face_between(
+    at: tuple[int, int, int], way: int, low: int, faces: FaceGrid, across: Integers
+) -> int:
+    """Flat index of one of the two faces between the control volume at (i, j, k) and the one beside
+    it along another axis: that at the lower (0) or upper (1) of its cells; -1 beyond the domain.
 
     across  (3,) shape of the faces across that axis
     """
     component, shape, wraps = faces
-    n1, n2 = shape[1], shape[2]
-    axis = way // 2
-    at = (f // (n1 * n2), (f // n2) % n1, f % n2)
-    place, count, up = at[component] + low - 1, shape[component] - 1, way % 2
+    axis, up = way // 2, way % 2
+    place, count = at[component] + low - 1, shape[component] - 1
     if wraps[component] > 0:
-        place %= count
+        place += count * (int(place < 0) - int(place >= count))
     elif place < 0 or place >= count:
         return -1
     i = place if component == 0 else at[0] + up * int(axis == 0)
@@ -104,7 +107,7 @@ def openings(
     w is the open part of the cell between both along the component's own axis, elsewhere the mean
     of the two faces between them times the smaller one of their own.
 
-    kinds   of the faces
+    kinds   of the faces; the listed ones are LISTED
     opened  open part of each
     cells   open volume of each cell
     cell    volume of a whole one
@@ -112,31 +115,32 @@ def openings(
     above, way, rest = np.empty(listed.size, np.int64), np.zeros(listed.size), np.zeros(listed.size)
     across, room = across_axis(opened, axis), cells.reshape(-1)
     own, sides = across_axis(opened, faces.component).reshape(-1), across.reshape(-1)
-    wide, near = np.array(across.shape), [0, 0]
+    wide, kind, near = np.array(across.shape), kinds.reshape(-1), 0
+    step, count, ring = stride(faces.shape, axis), faces.shape[axis], faces.wraps[axis]
     for n in range(listed.size):
         f, above[n] = listed[n], -1
+        at = indices(faces.shape, f)
+        beside = both_beside(f, at[axis], step, count, ring)
         for side in range(2):
-            to = neighbour(faces.shape, faces.wraps, f, 2 * axis + side)
-            if to < 0:
-                continue
-            at = near[side] = place_of(listed, to, near[side])
-            there = at < listed.size and listed[at] == to
-            if there and side == 0:
+            to = beside[side]
+            there = to >= 0 and kind[to] & LISTED != 0
+            if to < 0 or (there and side == 0):
                 continue
             if axis == faces.component:
-                part = room[cell_beside(f, side, faces)] / cell
+                part = room[cell_beside(at, side, faces)] / cell
                 opening = min(max(part, 0.0), 1.0)
             else:
-                total, count = 0.0, 0
+                total, met = 0.0, 0
                 for low in range(2):
-                    between = face_between(f, 2 * axis + side, low, faces, wide)
+                    between = face_between(at, 2 * axis + side, low, faces, wide)
                     if between >= 0:
                         total += sides[between]
-                        count += 1
-                opening = total / count * min(own[f], own[to])
+                        met += 1
+                opening = total / met * min(own[f], own[to])
             if there:
-                above[n], way[n] = at, opening
-            elif kinds.reshape(-1)[to] & DRIVEN:
+                near = place_of(listed, to, near)
+                above[n], way[n] = near, opening
+            elif kind[to] & DRIVEN:
                 rest[n] += opening * own[to]
     return Openings(above, way, rest)
 
@@ -224,14 +228,14 @@ def with_neighbours(cut: Integers, kinds: Marks, faces: FaceGrid) -> Integers:
 
     kinds  of the faces; on return LISTED too where a face is in the list
     """
-    kind = kinds.reshape(-1)
+    kind, beside = kinds.reshape(-1), np.empty(6, np.int64)
     found, count = np.empty(7 * cut.size, np.int64), cut.size
     for n in range(count):
         found[n] = cut[n]
         kind[cut[n]] |= LISTED
     for f in cut:
-        for way in range(6):
-            to = neighbour(faces.shape, faces.wraps, f, way)
+        find_beside(beside, faces.shape, faces.wraps, f)
+        for to in beside:
             if to >= 0 and kind[to] & DRIVEN and not kind[to] & LISTED:
                 kind[to] |= LISTED
                 found[count] = to
@@ -261,11 +265,10 @@ def share_out(
     component, shape, wraps = faces
     flat, part_flat = volume.reshape(-1), across_axis(opened, component).reshape(-1)
     size = listed.size
-    stride = shape[1] * shape[2] if component == 0 else (shape[2] if component == 1 else 1)
     part, held, aim = np.empty(size), np.empty(size), np.empty(size)
     for n in range(size):
         f = listed[n]
-        part[n], held[n], at = part_flat[f], flat[f], (f // stride) % shape[component]
+        part[n], held[n], at = part_flat[f], flat[f], indices(shape, f)[component]
         outer = wraps[component] == 0 and (at == 0 or at == shape[component] - 1)
         aim[n] = cell * part[n] * (0.5 if outer else 1.0)
     above, way = np.empty((3, size), np.int64), np.empty((3, size))

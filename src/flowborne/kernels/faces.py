@@ -56,6 +56,15 @@ def accelerate(out: Array, opened: Array, mass: Array, area: float) -> None:
 
 
 @kernel
+def weigh(weight: Array, opened: Array, rate: Array, area: float) -> None:
+    """a A rate: the weight in the pressure's matrix of a face with a rate a A / m."""
+    w, part, rates = flat(weight), flat(opened), flat(rate)
+    for i in prange(w.shape[0]):
+        for k in range(w.shape[1]):
+            w[i, k] = area * part[i, k] * rates[i, k]
+
+
+@kernel
 def mean_flux(
     flux: Array,
     weight: Array,
@@ -132,6 +141,19 @@ def weighted_change(weight: Array, before: Array, after: Array) -> tuple[float, 
         total += parts[0, i]
         size += parts[1, i]
     return total, size
+
+
+@kernel
+def largest_size(field: Array) -> float:
+    """Largest size of a field."""
+    values, most = flat(field), np.zeros(field.shape[0])
+    for i in prange(values.shape[0]):
+        found = 0.0
+        for k in range(values.shape[1]):
+            size = abs(values[i, k])
+            found = size if size > found else found
+        most[i] = found
+    return float(most.max())
 
 
 @kernel

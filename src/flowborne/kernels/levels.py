@@ -30,6 +30,7 @@ from flowborne.kernels.aggregates import (
 )
 from flowborne.kernels.arrays import (
     Array,
+    Finest,
     Hierarchy,
     Indices,
     Integers,
@@ -38,8 +39,9 @@ from flowborne.kernels.arrays import (
     Real,
     Triple,
 )
-from flowborne.kernels.even import SINGLE, find_even
+from flowborne.kernels.even import ROUNDING, SINGLE, find_even
 from flowborne.kernels.jit import kernel
+from flowborne.kernels.vectors import largest, scaled
 
 
 @kernel
@@ -281,6 +283,43 @@ def coarse_sums(
 
 
 @kernel
+def has_any(values: Real) -> bool:
+    """Whether some value is not 0."""
+    found, flat = 0, values.reshape(-1)
+    for n in range(flat.size):
+        found += int(flat[n] != 0.0)
+    return found > 0
+
+
+@kernel
+def columns_to_diagonal(weights: Triple, added: Real, periodic: Periodic) -> None:
+    """Move the weights of outer faces behind which p = 0 is more than a cell away to what is added
+    to the diagonal, in place; they are less than those of the faces opposite.
+
+    Such a weight hardly depends on the size of the cells, and p does not fall towards the side: its
+    sums are right on coarse levels, where the side of an open one is halved.
+
+    weights, added  padded
+    """
+    shape = added.shape
+    stride = shape[1] * shape[2], shape[2], 1
+    more = added.reshape(-1)
+    for axis in range(3):
+        n, step, w = shape[axis] - 2, stride[axis], weights[axis].reshape(-1)
+        if periodic[axis] or n < 1:
+            continue
+        one, other = int(axis == 0), 2 - int(axis == 2)
+        for cell, outer, inner in ((1, 1, 2), (n, n + 1, n)):
+            for a in range(shape[one]):
+                for b in range(shape[other]):
+                    at = a * stride[one] + b * stride[other]
+                    moved = w[at + outer * step]
+                    if moved < w[at + inner * step]:
+                        more[at + cell * step] += moved
+                        w[at + outer * step] = 0.0
+
+
+@kernel
 def coarsen(hierarchy: Hierarchy) -> None:
     """Fill all levels from the weights of the finest, from what is added to its diagonal, and from
     which of its rows are even."""
@@ -296,7 +335,7 @@ def coarsen(hierarchy: Hierarchy) -> None:
         orphans,
         aggregates,
     ) = hierarchy
-    reacts = np.any(at_level(reaction, table, 0))
+    reacts = has_any(at_level(reaction, table, 0))
     for level in range(table.shape[0] - 1):
         w, share = weights_at(weights, table, level), at_level(inverse, table, level)
         added = at_level(reaction, table, level)
@@ -340,3 +379,33 @@ def coarsen(hierarchy: Hierarchy) -> None:
         add_orphan_weights(
             mark, w, wide, factor, ratio, periodic, orphans_at(orphans, table, level), aggregate
         )
+
+
+@kernel
+def fill_levels(
+    hierarchy: Hierarchy, faces: tuple[Array, Array, Array], reaction: Array, finest: Finest
+) -> tuple[float, int]:
+    """Fill finest level and hierarchy from the weights on the faces.
+
+    reaction  of K + D, see `pressure.PressureSystem`
+    returns   scale of the hierarchy's weights, common cell of the finest level (see `even`)
+    """
+    table, periodic, weights, even = hierarchy[0], hierarchy[1], hierarchy[2], hierarchy[5]
+    w0, w1, w2, diagonal = finest
+    finest_weights(faces, (w0, w1, w2), diagonal)
+    most = largest(diagonal)
+    scale = 1.0 / most if most > 0.0 else 1.0
+    for source, target in ((w0, weights[0]), (w1, weights[1]), (w2, weights[2])):
+        scaled(source, target[: source.size], scale)
+    added = at_level(hierarchy[3], table, 0)
+    added[:] = 0.0
+    if reaction.size:
+        d, more = int(added.shape[0] > 1), reaction.reshape(-1)
+        n1, n2 = added.shape[1] - 2, added.shape[2] - 2
+        for n in range(more.size):
+            added[n // (n1 * n2) + d, (n // n2) % n1 + 1, n % n2 + 1] = scale * more[n]
+    columns_to_diagonal(weights_at(weights, table, 0), added, periodic)
+    common = find_even((w0, w1, w2), periodic, even_at(even, table, 0), ROUNDING)
+    table[0, COMMON] = common
+    coarsen(hierarchy)
+    return scale, common

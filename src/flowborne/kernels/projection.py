@@ -1,4 +1,7 @@
-"""Divergence and pressure gradient on cut cells, and the pressure of cells that have opened."""
+"""Divergence and pressure gradient on cut cells, and the pressure of cells that have opened.
+
+A slab is a room one layer thick along its first axis, as in `flux`.
+"""
 
 from __future__ import annotations
 
@@ -8,23 +11,55 @@ from numba import njit, prange
 from flowborne.kernels.arrays import Array, Faces, Integers
 from flowborne.kernels.control_volumes import across_axis, neighbour
 from flowborne.kernels.dye import face_of
-from flowborne.kernels.jit import kernel
+from flowborne.kernels.jit import inlined, kernel
 
 
 @kernel
 def net_out(out: Array, qx: Array, qy: Array, qz: Array) -> None:
     """Net volume that leaves each cell per time, of the volume per time through its faces."""
+    deep = qx.shape[0] - out.shape[0]
     for i in prange(out.shape[0]):
         for j in range(out.shape[1]):
             for k in range(out.shape[2]):
                 out[i, j, k] = (
-                    qx[i + 1, j, k]
+                    qx[i + deep, j, k]
                     - qx[i, j, k]
                     + qy[i, j + 1, k]
                     - qy[i, j, k]
                     + qz[i, j, k + 1]
                     - qz[i, j, k]
                 )
+
+
+@inlined
+def push(
+    velocity: Array, rate: Array, i: int, j: int, k: int, scale: float, difference: float
+) -> None:
+    """`subtract_gradient` on one face, between two cells of this difference in pressure."""
+    velocity[i, j, k] -= 0.0 if rate[i, j, k] == 0.0 else scale * rate[i, j, k] * difference
+
+
+@kernel
+def open_outflow(out: Array, opened: Faces, velocity: Faces, rate: Array, area: float) -> None:
+    """Net volume that leaves each cell per time through open parts of its faces, less `rate`."""
+    a0, a1, a2 = opened
+    u0, u1, u2 = velocity
+    net, less = out, rate
+    d = int(out.shape[2] > 1)
+    if not d:  # a slab's rows along y
+        n0, n1 = out.shape[0], out.shape[1]
+        net, less = out.reshape((1, n0, n1)), rate.reshape((1, n0, n1))
+        a1, a2 = a0.reshape((1, n0 + 1, n1)), a1.reshape((1, n0, n1 + 1))
+        u1, u2 = u0.reshape((1, n0 + 1, n1)), u1.reshape((1, n0, n1 + 1))
+    for i in prange(net.shape[0]):
+        for j in range(net.shape[1]):
+            for k in range(net.shape[2]):
+                total = 0.0
+                if d:
+                    total = a0[i + 1, j, k] * u0[i + 1, j, k] - a0[i, j, k] * u0[i, j, k]
+                total = total + a1[i, j + 1, k] * u1[i, j + 1, k] - a1[i, j, k] * u1[i, j, k]
+                total = total + a2[i, j, k + 1] * u2[i, j, k + 1] - a2[i, j, k] * u2[i, j, k]
+                net[i, j, k] = total * area - less[i, j, k]
 
 
 @kernel
@@ -38,29 +73,30 @@ def subtract_gradient(
     scale     dt for a pressure, 1 for p^
     periodic  whether the domain is along the axis; else the pressure beyond the sides is 0
     """
-    n = pressure.shape[axis]
-    di, dj, dk = int(axis == 0), int(axis == 1), int(axis == 2)
+    n, wide = pressure.shape[axis], velocity.shape[2]
     for i in prange(velocity.shape[0]):
         for j in range(velocity.shape[1]):
-            for k in range(velocity.shape[2]):
-                if rate[i, j, k] == 0.0:
-                    continue
-                at = i if axis == 0 else (j if axis == 1 else k)
-                if 0 < at < n:
-                    difference = pressure[i, j, k] - pressure[i - di, j - dj, k - dk]
-                elif at == 0:
-                    difference = pressure[i, j, k]
-                    if periodic:
-                        far = pressure[i + di * (n - 1), j + dj * (n - 1), k + dk * (n - 1)]
-                        difference = pressure[i, j, k] - far
-                else:
-                    difference = -pressure[i - di, j - dj, k - dk]
-                    if periodic:
-                        difference = (
-                            pressure[i - di * n, j - dj * n, k - dk * n]
-                            - pressure[i - di, j - dj, k - dk]
-                        )
-                velocity[i, j, k] -= scale * rate[i, j, k] * difference
+            at = i if axis == 0 else j
+            below, above = at - 1 if at > 0 else n - 1, at if at < n else 0
+            i0, i1 = (below, above) if axis == 0 else (i, i)
+            j0, j1 = (below, above) if axis == 1 else (j, j)
+            if axis == 2:
+                for k in range(1, n):
+                    difference = pressure[i, j, k] - pressure[i, j, k - 1]
+                    push(velocity, rate, i, j, k, scale, difference)
+                first, last = pressure[i, j, 0], pressure[i, j, n - 1]
+                push(velocity, rate, i, j, 0, scale, first - last if periodic else first)
+                push(velocity, rate, i, j, n, scale, first - last if periodic else -last)
+            elif periodic or 0 < at < n:
+                for k in range(wide):
+                    difference = pressure[i1, j1, k] - pressure[i0, j0, k]
+                    push(velocity, rate, i, j, k, scale, difference)
+            elif at == 0:
+                for k in range(wide):
+                    push(velocity, rate, i, j, k, scale, pressure[i, j, k])
+            else:
+                for k in range(wide):
+                    push(velocity, rate, i, j, k, scale, -pressure[i0, j0, k])
 
 
 @njit(nogil=True, cache=True)

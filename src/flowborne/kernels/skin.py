@@ -13,6 +13,7 @@ from numba import njit
 
 from flowborne.kernels.arrays import Array, Integers, Nodes, Point
 from flowborne.kernels.edge_crossings import Crossings, add_crossing
+from flowborne.kernels.jit import inlined
 from flowborne.kernels.node_distance import BAND
 from flowborne.kernels.triangles import closest_on_triangle, squared_distance
 
@@ -21,6 +22,23 @@ BESIDE = 2.0
 
 ON_SKIN = 1e-9
 """A node as many cells from the skin or nearer lies on it, and counts as this far inside."""
+
+
+CLEARLY, ROUNDED = 1.0 + 1e-9, 1e-18
+"""Ratio of squared distances, and cells squared besides, from which on one is the larger one,
+whatever is rounded."""
+
+
+@inlined
+def box_square(p: Point, a: Point, b: Point, c: Point) -> float:
+    """Square of the distance from a place to the box around a triangle, which that to the triangle
+    is not below."""
+    total = 0.0
+    for m in range(3):
+        low, high = min(a[m], b[m], c[m]), max(a[m], b[m], c[m])
+        away = max(low - p[m], p[m] - high, 0.0)
+        total += away * away
+    return total
 
 
 @njit(nogil=True, cache=True)
@@ -107,6 +125,8 @@ def lower_squares(
                 if (above + nz * k) ** 2 >= square[i, j, k]:
                     continue
                 p = (float(i), float(j), float(k))
+                if box_square(p, a, b, c) > CLEARLY * square[i, j, k] + ROUNDED:
+                    continue
                 found = squared_distance(p, a, b, c, closest_on_triangle(p, a, b, c))
                 square[i, j, k] = min(square[i, j, k], found)
 
@@ -281,17 +301,26 @@ def skin_weights(
     number, start, listed = triangles_by_cell(x, vertices, triangles, h)
     for row in range(x.shape[0]):
         p = (x[row, 0], x[row, 1], x[row, 2])
-        nearest = (BESIDE * h) ** 2
+        nearest = bound = (BESIDE * h) ** 2
+        if row > 0 and weights[row - 1].any():  # that of the place before is near this one as well
+            n, m, o = corners[row - 1]
+            a = (vertices[n, 0], vertices[n, 1], vertices[n, 2])
+            b = (vertices[m, 0], vertices[m, 1], vertices[m, 2])
+            c = (vertices[o, 0], vertices[o, 1], vertices[o, 2])
+            found = closest_on_triangle(p, a, b, c)
+            bound = min(bound, squared_distance(p, a, b, c, found))
         for at in range(start[number[row]], start[number[row] + 1]):
             t = listed[at]
             n, m, o = triangles[t, 0], triangles[t, 1], triangles[t, 2]
             a = (vertices[n, 0], vertices[n, 1], vertices[n, 2])
             b = (vertices[m, 0], vertices[m, 1], vertices[m, 2])
             c = (vertices[o, 0], vertices[o, 1], vertices[o, 2])
+            if box_square(p, a, b, c) > CLEARLY * bound + ROUNDED * h * h:
+                continue
             found = closest_on_triangle(p, a, b, c)
             square = squared_distance(p, a, b, c, found)
             if square < nearest:
-                nearest = square
+                nearest, bound = square, min(bound, square)
                 for corner in range(3):
                     corners[row, corner] = triangles[t, corner]
                     weights[row, corner] = found[corner]

@@ -155,6 +155,48 @@ def smooth(out: Real, x: Real, b: Real, operator: Operator, step: int) -> None:
 
 
 @kernel
+def smooth_often(x: Real, r: Real, b: Real, operator: Operator, steps: int) -> None:
+    """`smooth` on the coarsest level, without periodic axes, from its second step on, from x to r
+    and back. By a list of cells: rows of four are too short for vector code."""
+    w0, w1, w2, inverse, even, common = operator
+    d, (p0, p1, p2) = int(x.shape[0] > 1), x.shape
+    c0, c1, c2 = at_cell(w0, common), at_cell(w1, common), at_cell(w2, common)
+    count, far, wide = (p0 - 2 * d) * (p1 - 2) * (p2 - 2), d * p1 * p2, p2
+    at, same = np.empty(count, np.int64), np.empty(count, np.uint8)
+    w, part = np.empty((7, count), x.dtype), np.empty((STEPS, count), x.dtype)
+    n = 0
+    for m in range(d, p0 - d):
+        for j in range(1, p1 - 1):
+            for k in range(1, p2 - 1):
+                at[n], same[n], w[0, n] = (m * p1 + j) * p2 + k, even[m, j], b[m, j, k]
+                w[1, n], w[2, n] = w1[m, j, k], w1[m, j + 1, k]
+                w[3, n], w[4, n] = w2[m, j, k], w2[m, j, k + 1]
+                w[5, n], w[6, n] = w0[m, j, k], w0[m + d, j, k]
+                for step in range(STEPS):
+                    part[step, n] = x.dtype.type(WEIGHTS[step]) * inverse[m, j, k]
+                n += 1
+    here, there = x.reshape(-1), r.reshape(-1)
+    for turn in range(1, steps):
+        step = turn % STEPS
+        keep = x.dtype.type(1.0 - WEIGHTS[step])
+        for n in range(count):
+            c = at[n]
+            if same[n]:
+                total = w[0, n] + c1 * (here[c - wide] + here[c + wide])
+                total += c2 * (here[c - 1] + here[c + 1])
+                if d:
+                    total += c0 * (here[c - far] + here[c + far])
+            else:
+                total = w[0, n] + w[1, n] * here[c - wide]
+                total += w[2, n] * here[c + wide]
+                total += w[3, n] * here[c - 1] + w[4, n] * here[c + 1]
+                if d:
+                    total += w[5, n] * here[c - far] + w[6, n] * here[c + far]
+            there[c] = keep * here[c] + part[step, n] * total
+        here, there = there, here
+
+
+@kernel
 def begin_plane(x: Real, b: Real, inverse: Real, m: int) -> None:
     """`first_smooth` on plane m."""
     part = x.dtype.type(WEIGHTS[0])

@@ -30,7 +30,15 @@ from flowborne.kernels.levels import (
     weights_at,
     wrap_ghosts,
 )
-from flowborne.kernels.smoothing import STEPS, defect, first_smooth, smooth, smooth_down, smooth_up
+from flowborne.kernels.smoothing import (
+    STEPS,
+    defect,
+    first_smooth,
+    smooth,
+    smooth_down,
+    smooth_often,
+    smooth_up,
+)
 
 
 @kernel
@@ -193,6 +201,9 @@ def leg(hierarchy: Hierarchy, x: Real, b: Real, r: Real, level: int, down: bool)
             first_smooth(xl, bl, a)
         here, there = (xl, rl) if down else (rl, xl)
         steps = STEPS * COARSEST if level == coarsest else STEPS
+        if level == coarsest and not periodic.any():
+            smooth_often(xl, rl, bl, operator, steps)
+            return
         for n in range(1 if down else 0, steps):
             wrap_ghosts(here, periodic)
             smooth(there, here, bl, operator, n % STEPS if down else STEPS - 1 - n)

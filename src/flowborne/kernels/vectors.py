@@ -83,12 +83,19 @@ def turn(p: Array, z: Array, beta: float) -> None:
 
 
 @kernel
-def true_residual(r: Array, rhs: Array, q: Array) -> None:
-    """r = rhs - q."""
-    for i in prange(r.shape[0]):
+def true_residual(r: Array, rhs: Array, q: Array) -> float:
+    """r = rhs - q; returns r . r."""
+    planes, size = r.shape[0], r.shape[2]
+    parts = np.zeros(planes)
+    for i in prange(planes):
+        row = np.zeros(size)
         for j in range(r.shape[1]):
-            for k in range(r.shape[2]):
-                r[i, j, k] = rhs[i, j, k] - q[i, j, k]
+            for k in range(size):
+                value = rhs[i, j, k] - q[i, j, k]
+                r[i, j, k] = value
+                row[k] += value * value
+        parts[i] = in_order(row)
+    return in_order(parts)
 
 
 @kernel

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import replace
 from functools import cached_property, lru_cache
+from math import prod
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
@@ -20,7 +21,7 @@ from flowborne.coupling.stream import FlowState, flow_at
 from flowborne.coupling.world import Setup, World
 from flowborne.fluid.boundary import SIDES
 from flowborne.kernels.arrays import PRESCRIBED, Array, Integers, Mask
-from flowborne.kernels.jit import cores, kernel_threads
+from flowborne.kernels.jit import LARGE, cores, kernel_threads
 from flowborne.runs.summary import BUDGET_OPEN
 from flowborne.scenes.changes import ChangeTable, values_at
 from flowborne.sim.columns import Columns
@@ -41,6 +42,9 @@ Step = Callable[[World, float, "JointCommand | None"], StepReport]
 
 MAX_INVERTED = 0.02
 """Largest share of the elements of flesh that may be inside out for a while."""
+
+FIELDS = 4
+"""Elements per cell of a kernel's largest array: all levels of a solve, with their ghosts."""
 
 LISTED = 4
 """Maximum number of dofs named in a message."""
@@ -200,7 +204,7 @@ class Simulation:
         beyond: tuple[str, ...] = ()
         if commands:
             world.told, beyond = told_by(commands, world, self.frame_time, self._drives())
-        with _one_blas_thread(), kernel_threads():
+        with _one_blas_thread(), kernel_threads(_threads(world.setup)):
             report = self._advance(world, self.frame + 1, beyond)
         world.told = NOTHING_TOLD
         moment = Snapshot(world, report.frame, report)
@@ -463,6 +467,14 @@ def default_workers(joints: int, fluid: bool) -> int:
 def _blas() -> ThreadpoolController:
     """The loaded BLAS libraries: all of them, once a simulation has been built."""
     return ThreadpoolController()
+
+
+def _threads(setup: Setup) -> int | None:
+    """Most threads of a frame's kernels; None for as many as there are cores. With one, no call
+    searches its arguments for arrays that are LARGE."""
+    cells = 0 if setup.fluid is None else prod(setup.fluid.grid.shape)
+    small = setup.solid.flesh is None and FIELDS * cells < LARGE
+    return 1 if small else None
 
 
 def _one_blas_thread() -> AbstractContextManager[object]:

@@ -22,23 +22,10 @@ from flowborne.kernels.arrays import (
     Operator,
     Periodic,
     Real,
-    Triple,
     Vectors,
 )
-from flowborne.kernels.even import ROUNDING, find_even
-from flowborne.kernels.levels import (
-    COMMON,
-    INTERPOLATION,
-    ROW,
-    at_level,
-    coarsen,
-    even_at,
-    finest_weights,
-    padded_size,
-    weights_at,
-)
+from flowborne.kernels.levels import INTERPOLATION, ROW, even_at, fill_levels, padded_size
 from flowborne.kernels.regions import label_regions
-from flowborne.kernels.vectors import largest, scaled
 
 COARSEST = 4
 """Most cells along an axis of the coarsest level."""
@@ -123,25 +110,10 @@ class Buffers:
         returns   number of regions without an open side, scale of the hierarchy's weights, and K on
                   the finest level
         """
-        w0, w1, w2, diagonal = self.finest
-        finest_weights(faces, (w0, w1, w2), diagonal)
-        most = largest(diagonal)
-        scale = 1.0 / most if most > 0.0 else 1.0
-        for source, target in zip((w0, w1, w2), self.weights, strict=True):
-            scaled(source, target[: source.size], scale)
-        added = at_level(self.reaction, self.table, 0)
-        added[:] = 0.0
-        d = 1 if added.shape[0] > 1 else 0
-        if reaction.size:
-            inner = added[d : added.shape[0] - d, 1:-1, 1:-1]
-            inner[:] = scale * reaction.reshape(inner.shape)
-        columns_to_diagonal(weights_at(self.weights, self.table, 0), added, self.periodic)
-        even = even_at(self.even, self.table, 0)
-        common = find_even((w0, w1, w2), self.periodic, even, ROUNDING)
-        self.table[0, COMMON] = common
-        coarsen(self.hierarchy)
+        scale, common = fill_levels(self.hierarchy, faces, reaction, self.finest)
         regions = label_regions(self.finest, self.periodic, self.label, self.parent, self.count)
-        return regions, scale, (w0, w1, w2, diagonal, even, int(common))
+        even = even_at(self.even, self.table, 0)
+        return regions, scale, (*self.finest, even, int(common))
 
 
 _spare: dict[tuple[tuple[int, int, int], tuple[bool, bool, bool]], list[Buffers]] = {}
@@ -158,25 +130,3 @@ def borrow(
         buffers = Buffers(shape, periodic)
     weakref.finalize(owner, store.append, buffers)
     return buffers
-
-
-def columns_to_diagonal(weights: Triple, added: Real, periodic: Periodic) -> None:
-    """Move the weights of outer faces behind which p = 0 is more than a cell away to what is added
-    to the diagonal, in place; they are less than those of the faces opposite.
-
-    Such a weight hardly depends on the size of the cells, and p does not fall towards the side: its
-    sums are right on coarse levels, where the side of an open one is halved.
-
-    weights, added  padded
-    """
-    for axis, across in enumerate(weights):
-        faces, cells = across.swapaxes(0, axis), added.swapaxes(0, axis)
-        n = added.shape[axis] - 2
-        if periodic[axis] or n < 1:
-            continue
-        for cell, outer, inner in ((1, 1, 2), (n, n + 1, n)):
-            if not faces[outer].any():
-                continue
-            moved = np.where(faces[outer] < faces[inner], faces[outer], 0.0)
-            cells[cell] += moved
-            faces[outer] -= moved

@@ -67,7 +67,7 @@ START = np.zeros(1, np.int32)
 def dense_mobility(matrix: Array) -> Mobility:
     """Of a dense A^-1 (k, k)."""
     whole = np.ascontiguousarray(matrix)
-    share, axes = np.linalg.eigh(whole) if len(whole) else (np.zeros(0), whole)
+    share, axes = np.linalg.eigh(whole) if whole.any() else (np.zeros(len(whole)), whole)
     none = np.zeros(0, np.int64)
     blocks = none, none, NONE, none, NONE
     arrays = whole, START, NONE, np.zeros(0), np.zeros(0), blocks, none, np.zeros((0, 0))

@@ -169,7 +169,10 @@ class PressureSystem:
         if self._prepared is None or self._prepared[0] is not term:
             self._prepared = term, *self._with_term(term)
         matrix, cycle = self._prepared[1:]
-        iterations, residual, converged = solve(matrix, cycle, b.vectors, tolerance, absolute)
+        guessed = guess is not None and bool(guess.any())
+        iterations, residual, converged = solve(
+            matrix, cycle, b.vectors, tolerance, absolute, guessed
+        )
         start = (1 if inner[0] > 1 else 0, 1, 1)
         inside = tuple(slice(s, s + n) for s, n in zip(start, cells, strict=True))
         pressure = x[inside].copy().reshape(self.shape)
@@ -185,7 +188,7 @@ class PressureSystem:
         """The matrix with the term, the same for every right-hand side, and what deflates it."""
         b, mobility = self.buffers, term.mobility
         diagonal = b.finest[3]
-        rows = padded_rows(term.rows, diagonal)
+        rows = padded_rows(term.rows, diagonal) if term.rows[0].size else term.rows
         null, amounts, fields = NO_VECTORS, NO_VECTORS, NO_FIELDS
         if self.regions:
             loads = region_loads(b.label, self.regions, mobility.size, rows)
@@ -201,6 +204,8 @@ class PressureSystem:
 
 def padded_cells(cells: Integers, shape: tuple[int, int, int]) -> Integers:
     """Flat indices of cells of a grid of this shape in padded arrays."""
+    if not cells.size:
+        return cells
     i, j, k = np.unravel_index(cells, shape)
     deep = int(shape[0] > 1)
     return np.ravel_multi_index(

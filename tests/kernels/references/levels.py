@@ -5,7 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from flowborne.kernels.aggregates import OWN
-from flowborne.kernels.arrays import Array, Faces, Finest, Indices, Integers, Marks, Real, Triple
+from flowborne.kernels.arrays import (
+    Array,
+    Faces,
+    Finest,
+    Indices,
+    Integers,
+    Marks,
+    Periodic,
+    Real,
+    Triple,
+)
 
 from ..padded import cells_of
 from .laplacian import neighbour_sum
@@ -75,3 +85,16 @@ def coarse_sums_reference(
     out[cells_of(out)] = values
     np.add.at(out.reshape(-1), aggregates.reshape(-1)[orphans], fine.reshape(-1)[orphans])
     return out
+
+
+def columns_to_diagonal_reference(weights: Triple, added: Real, periodic: Periodic) -> None:
+    """`columns_to_diagonal` in NumPy."""
+    for axis, across in enumerate(weights):
+        faces, cells = across.swapaxes(0, axis), added.swapaxes(0, axis)
+        n = added.shape[axis] - 2
+        if periodic[axis] or n < 1:
+            continue
+        for cell, outer, inner in ((1, 1, 2), (n, n + 1, n)):
+            moved = np.where(faces[outer] < faces[inner], faces[outer], 0.0)
+            cells[cell] += moved
+            faces[outer] -= moved

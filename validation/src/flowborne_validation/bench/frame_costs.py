@@ -7,6 +7,7 @@ that they use is compared with that of p = z + s p in the same run (after the tr
 
 from __future__ import annotations
 
+import gc
 import multiprocessing
 import tracemalloc
 from collections.abc import Iterator, Sequence
@@ -192,6 +193,7 @@ def memory_here(scene: Scene, frames: tuple[int, ...]) -> list[Held]:
             for count in frames:
                 while simulation.frame < count:
                     simulation.advance_frame()
+                gc.collect()
                 found.append(Held(count, *tracemalloc.get_traced_memory(), peak_memory() or 1))
     finally:
         tracemalloc.stop()
