@@ -105,8 +105,17 @@ def case_of(shape: tuple, periodic: tuple, component: int, seed: int = 0) -> Cas
     return Case(cells, opened, volumes, np.flatnonzero(closed), wraps, last, component)
 
 
-def targets_of(case: Case) -> tuple[np.ndarray, np.ndarray]:
-    return find_targets(case.small, case.pushed, case.opened, case.volumes, case.cells, case.faces)
+def targets_of(case: Case) -> Closed:
+    return find_targets(
+        case.small, case.pushed, case.opened, case.volumes, case.cells, case.faces, 1e-9
+    )
+
+
+def of_all(closed: Closed, size: int) -> np.ndarray:
+    """Share of each control volume (n, size) in each closed one, in ascending order of these."""
+    shares, order = np.zeros((closed.faces.size, size)), np.argsort(closed.faces)
+    np.add.at(shares, (np.argsort(order)[:, None], closed.targets), closed.shares)
+    return shares
 
 
 @ROOM_OR_SLAB
@@ -129,18 +138,28 @@ def test_merged(sizes: tuple[int, int]) -> None:
 
 @ROOM_OR_SLAB
 def test_hosts(shape: tuple, periodic: tuple, component: int) -> None:
-    """Found as said; those of small ones that move with one are open, and all of them is given."""
+    """Found as said; a closed one that is a target comes later, so that in the end all is given."""
     for seed in range(20):
         case = case_of(shape, periodic, component, seed)
-        targets, parts = targets_of(case)
-        assert parts.any()
-        assert (case.opened.ravel()[targets[parts > 0.0]] > 0.0).all()
-        np.testing.assert_allclose(parts.sum(axis=1)[parts.any(axis=1)], 1.0, rtol=1e-15)
-        expected, shares = find_targets_reference(
-            case.small, case.pushed, case.opened, case.volumes, case.cells, component, case.wraps
+        closed = targets_of(case)
+        expected = find_targets_reference(
+            case.small,
+            case.pushed,
+            case.opened,
+            case.volumes,
+            case.cells,
+            component,
+            case.wraps,
+            1e-9,
         )
-        np.testing.assert_array_equal(targets, expected)
-        np.testing.assert_allclose(parts, shares, rtol=1e-15)
+        assert expected.any()
+        np.testing.assert_array_equal(np.sort(closed.faces), case.small)
+        np.testing.assert_allclose(of_all(closed, case.volumes.size), expected, rtol=1e-14)
+        led = closed.shares.any(axis=1)
+        np.testing.assert_allclose(closed.shares[led].sum(axis=1), 1.0, rtol=1e-15)
+        given = np.ones(case.shape)
+        merge_small(given, closed)
+        np.testing.assert_allclose(given.ravel()[closed.faces[led]], 0.0, atol=1e-14)
 
 
 def test_what_is_on_either_side_of_a_thin_body_stays_there() -> None:
@@ -151,38 +170,55 @@ def test_what_is_on_either_side_of_a_thin_body_stays_there() -> None:
     volumes = np.array([0.5, 0.8, 0.4, 0.6, 0.5]).reshape(5, 1, 1)
     faces = FaceGrid(0, np.array(opened.shape), np.zeros(3, np.int64))
     pushed = (opened > 0.0).astype(np.uint8)
-    targets, parts = find_targets(np.array([2]), pushed, opened, volumes, cells, faces)
-    np.testing.assert_array_equal(targets, [[1, 3]])
-    np.testing.assert_allclose(parts, [[0.54 / 0.68, 0.14 / 0.68]])
+    closed = find_targets(np.array([2]), pushed, opened, volumes, cells, faces, 1e-9)
+    np.testing.assert_allclose(of_all(closed, 5), [[0.0, 0.54 / 0.68, 0.0, 0.14 / 0.68, 0.0]])
+
+
+def test_what_a_solve_left_has_no_way_ahead() -> None:
+    """Two cells that a body covers, one with less than nothing left and one with a little more."""
+    cells, opened, volumes = np.zeros((4, 2, 1)), np.zeros((5, 2, 1)), np.zeros((5, 2, 1))
+    cells[:, 0, 0], cells[:, 1, 0] = (0.8, 1e-13, -1e-13, 0.8), 1.0
+    opened[[1, 3], 0], opened[:, 1] = 0.1, 1.0
+    volumes[:, 0, 0], volumes[:, 1] = (0.4, 0.4, 0.0, 0.4, 0.4), 1.0
+    faces = FaceGrid(0, np.array(opened.shape), np.zeros(3, np.int64))
+    pushed = (opened > 0.0).astype(np.uint8)
+    closed = find_targets(np.array([2 * 2]), pushed, opened, volumes, cells, faces, 1e-9)
+    shares = of_all(closed, 10).reshape(5, 2)
+    np.testing.assert_allclose(shares[[1, 3], 0], 0.4 / 1.8)
+    np.testing.assert_allclose(shares[2, 1], 1.0 / 1.8)
 
 
 @ROOM_OR_SLAB
 def test_small_ones_give_to_targets(shape: tuple, periodic: tuple, component: int) -> None:
     case = case_of(shape, periodic, component)
-    targets, parts = targets_of(case)
+    closed = targets_of(case)
     amount = np.random.default_rng(1).standard_normal(case.volumes.shape)
     merged = amount.copy()
-    shares = parts * np.random.default_rng(2).uniform(size=len(parts))[:, None]
-    merge_small(merged, Closed(case.small, targets, shares))
-    expected = merge_small_reference(amount, case.small, targets, shares)
+    part = np.random.default_rng(2).uniform(size=(closed.faces.size, 1))
+    closed = closed._replace(shares=part * closed.shares)
+    given = merge_small(merged, closed)
+    expected = merge_small_reference(amount, *closed)
     np.testing.assert_allclose(merged, expected, atol=1e-14)
     assert merged.sum() == pytest.approx(amount.sum(), abs=1e-13 * np.abs(amount).sum())
+    taken = amount.ravel().copy()
+    np.add.at(taken, closed.targets, given)
+    np.subtract.at(taken, closed.faces, given.sum(axis=1))
+    np.testing.assert_allclose(taken, merged.ravel(), atol=1e-14)
 
 
 @ROOM_OR_SLAB
 def test_small_ones_bring_what_they_hold(shape: tuple, periodic: tuple, component: int) -> None:
     """Volumes of nothing hold an amount all the same, as one that closes in a step does."""
     case = case_of(shape, periodic, component)
-    (targets, parts), volumes = targets_of(case), case.volumes.copy()
-    volumes.reshape(-1)[case.small[::2]] = 0.0
+    closed, volumes = targets_of(case), case.volumes.copy()
+    volumes.reshape(-1)[closed.faces[::2]] = 0.0
     field = np.random.default_rng(1).standard_normal(volumes.shape)
     joined, merged = field.copy(), volumes.copy()
-    shares = parts * np.random.default_rng(2).uniform(size=len(parts))[:, None]
-    shares[::2] = parts[::2]
-    join_small(joined, merged, Closed(case.small, targets, shares), 1e-9)
-    expected, volumes_after = join_small_reference(
-        field, volumes, case.small, targets, shares, 1e-9
-    )
+    part = np.random.default_rng(2).uniform(size=(closed.faces.size, 1))
+    part[::2] = 1.0
+    closed = closed._replace(shares=part * closed.shares)
+    join_small(joined, merged, closed, 1e-9)
+    expected, volumes_after = join_small_reference(field, volumes, *closed, 1e-9)
     np.testing.assert_allclose(merged, volumes_after, rtol=1e-12, atol=1e-14)
     own = np.ones(field.size, bool)
     own[case.small] = False
@@ -235,8 +271,8 @@ def test_share_velocity(shape: tuple, periodic: tuple, component: int) -> None:
     case = case_of(shape, periodic, component)
     random = np.random.default_rng(7)
     small = np.sort(random.permutation(case.volumes.size)[:20])
-    targets = random.permutation(case.volumes.size)[:40].reshape(20, 2)
-    shares = 0.5 * random.random((20, 2))
+    targets = random.integers(case.volumes.size, size=(20, 6))
+    shares = random.random((20, 6)) / 6.0
     field = random.standard_normal(case.shape)
     expected = share_velocity_reference(field, small, targets, shares)
     share_velocity(field, Closed(small, targets, shares))

@@ -44,7 +44,7 @@ WHOLE = 1.0 - SLACK
 """Part of a cell from which on control volumes count as uncut."""
 
 NONE = np.zeros(0, np.int64)
-NONE_CLOSED = Closed(NONE, np.zeros((0, 2), np.int64), np.zeros((0, 2)))
+NONE_CLOSED = Closed(NONE, np.zeros((0, 6), np.int64), np.zeros((0, 6)))
 NO_TRANSFERS = Transfers(NONE, NONE, np.zeros(0))
 
 
@@ -97,8 +97,7 @@ def moving_volumes(
     limits = cell, WHOLE, SLACK * cell, NOTHING * cell
     sort_faces(volume, kinds, counts, room, wide[axis], axis, ends, limits)
     cut, shut, uneven = listed_kinds(kinds, counts)
-    targets = find_targets(shut, kinds, wide[axis], volume, room, faces)
-    closed = Closed(shut, *targets)
+    closed = find_targets(shut, kinds, wide[axis], volume, room, faces, NOTHING * cell)
     for _ in range(ROUNDS):
         uneven = np.sort(with_neighbours(uneven, kinds, faces))
     given = share_out(volume, closed, kinds, uneven, room, wide, faces, cell)

@@ -388,17 +388,19 @@ def settle(later: Array, high: Array, volumes: Volumes, span: float, nought: Arr
     high  volumes after the stage
     span  s, of the substep
     """
-    shut, targets, held = volumes.shut.faces, volumes.shut.targets, high.reshape(-1)
-    was = np.empty((shut.size, 3))
+    (shut, targets, _), held = volumes.shut, high.reshape(-1)
+    was = np.empty((shut.size, 7))
     for n in range(shut.size):
-        was[n, 0], was[n, 1] = held[targets[n, 0]], held[targets[n, 1]]
-        was[n, 2] = held[shut[n]]
+        was[n, 6] = held[shut[n]]
+        for m in range(6):
+            was[n, m] = held[targets[n, m]]
     join_small(later, high, volumes.shut, volumes.nothing)
     leaving = span * volumes.leaving
     level(later, high, volumes.cut, leaving, nought, volumes.nothing, volumes.faces)
     for n in range(shut.size):
-        held[targets[n, 0]], held[targets[n, 1]] = was[n, 0], was[n, 1]
-        held[shut[n]] = was[n, 2]
+        held[shut[n]] = was[n, 6]
+        for m in range(6):
+            held[targets[n, m]] = was[n, m]
     fill_and_follow(later, high, volumes, volumes.shut)
 
 

@@ -29,9 +29,9 @@ it, and it has one; its control volume is not what its opening says; it is in a 
 class Closed(NamedTuple):
     """Faces of one component that pressure does not push; what they hold goes to their targets.
 
-    faces    (n,) flat
-    targets  (n, 2) flat; one without a target is its own
-    shares   (n, 2) of each target
+    faces    (n,) flat; one that is a target comes after those that give to it
+    targets  (n, 6) flat, beside each, see `find_beside`; itself where that is none
+    shares   (n, 6) of each target
     """
 
     faces: Integers
@@ -156,23 +156,30 @@ def merged(one: Integers, other: Integers) -> tuple[Integers, Integers, Integers
 
 @njit(nogil=True, cache=True)
 def find_targets(
-    small: Integers, kinds: Marks, opened: Array, volumes: Array, cells: Array, faces: FaceGrid
-) -> tuple[Integers, Array]:
-    """Targets (n, 2) of every small one, and which parts (n, 2) of it go with them; the small one
-    itself where there is none.
+    small: Integers,
+    kinds: Marks,
+    opened: Array,
+    volumes: Array,
+    cells: Array,
+    faces: FaceGrid,
+    nothing: float,
+) -> Closed:
+    """Where what closed faces hold goes.
 
     A face that is wholly closed has a control volume where a cell beside it is open in part. What
     lies there goes along with the opposite faces of both cells, in proportion to their open parts
-    and to those of the cells; where both are closed with the neighbour that has the largest volume,
-    else with the targets of a neighbour, which may have them from another.
+    and to those of the cells; where both are closed with all open neighbours in proportion to their
+    volumes, else with closed ones that have targets, in the same way.
 
     small    (n,) closed faces with a volume
     kinds    of the faces, see `sort_faces`
     opened   open part of each face
     volumes  of each control volume
     cells    volume of each cell
+    nothing  volume up to which a cell holds nothing: it is what a solve left
     """
-    targets, parts = np.empty((small.size, 2), np.int64), np.zeros((small.size, 2))
+    targets, parts = np.empty((small.size, 6), np.int64), np.zeros((small.size, 6))
+    turn, last = np.full(small.size, -1), 0
     (component, shape, wraps), cell_shape = faces, np.array(cells.shape)
     volume_flat, beside = volumes.reshape(-1), np.empty(6, np.int64)
     open_flat, cell_flat, pushed = opened.reshape(-1), cells.reshape(-1), kinds.reshape(-1)
@@ -195,46 +202,58 @@ def find_targets(
             outside = a < 0 or b < 0 or c < 0
             if outside or a >= cell_shape[0] or b >= cell_shape[1] or c >= cell_shape[2]:
                 continue
-            to = beside[2 * component + side]
-            volume = cell_flat[(a * cell_shape[1] + b) * cell_shape[2] + c]
-            if to >= 0 and pushed[to] & DRIVEN and volume > 0.0:
-                targets[n, side], parts[n, side] = to, open_flat[to] * volume
-        total = parts[n, 0] + parts[n, 1]
+            way = 2 * component + side
+            to, volume = beside[way], cell_flat[(a * cell_shape[1] + b) * cell_shape[2] + c]
+            if to >= 0 and pushed[to] & DRIVEN and volume > nothing:
+                targets[n, way], parts[n, way] = to, open_flat[to] * volume
+        for way in range(6) if parts[n].sum() == 0.0 else range(0):
+            to = beside[way]
+            if to >= 0 and pushed[to] & DRIVEN:
+                targets[n, way], parts[n, way] = to, volume_flat[to]
+        total = parts[n].sum()
         if total > 0.0:
             parts[n] /= total
-            continue
-        most = 0.0
-        for to in beside:
-            if to >= 0 and pushed[to] & DRIVEN and volume_flat[to] > most:
-                targets[n, 0], parts[n, 0], most = to, 1.0, volume_flat[to]
+            turn[n] = 0
     led = True
     while led:
-        led, first, given = False, targets.copy(), parts.copy()
+        led = False
         for n in range(small.size):
-            if given[n, 0] + given[n, 1] > 0.0:
+            if turn[n] >= 0:
                 continue
-            most = -1.0
             find_beside(beside, shape, wraps, small[n])
-            for to in beside:
+            for way in range(6):
+                to = beside[way]
                 at = place_of(small, to, 0) if to >= 0 else small.size
-                if at == small.size or small[at] != to or given[at, 0] + given[at, 1] == 0.0:
-                    continue
-                if volume_flat[to] > most:
-                    targets[n], parts[n], most = first[at], given[at], volume_flat[to]
-                    led = True
-    return targets, parts
+                if at < small.size and small[at] == to and 0 <= turn[at] <= last:
+                    targets[n, way], parts[n, way] = to, max(volume_flat[to], nothing)
+            total = parts[n].sum()
+            if total > 0.0:
+                parts[n] /= total
+                turn[n], led = last + 1, True
+        last += int(led)
+    order, at = np.empty(small.size, np.int64), 0
+    for own in range(last, -2, -1):
+        for n in range(small.size):
+            if turn[n] == own:
+                order[at] = n
+                at += 1
+    return Closed(small[order], targets[order], parts[order])
 
 
 @njit(nogil=True, cache=True)
-def merge_small(amount: Array, closed: Closed) -> None:
-    """Give the targets of closed ones their shares of what these have of an amount, in place."""
+def merge_small(amount: Array, closed: Closed) -> Array:
+    """Give the targets of closed ones their shares of what these have of an amount, in place; gives
+    what (n, 6) each target got."""
     flat, (small, targets, shares) = amount.reshape(-1), closed
+    given = np.zeros(shares.shape)
     for n in range(small.size):
         own = flat[small[n]]
-        for m in range(2):
-            given = shares[n, m] * own
-            flat[targets[n, m]] += given
-            flat[small[n]] -= given
+        for m in range(6):
+            if shares[n, m] > 0.0:
+                given[n, m] = shares[n, m] * own
+                flat[targets[n, m]] += given[n, m]
+                flat[small[n]] -= given[n, m]
+    return given
 
 
 @njit(nogil=True, cache=True)
@@ -251,7 +270,7 @@ def join_small(field: Array, volumes: Array, closed: Closed, nothing: float) -> 
         g = small[n]
         room = volume[g]
         held = flat[g] * (room if room > nothing else 1.0)
-        for m in range(2):
+        for m in range(6):
             h, share = targets[n, m], shares[n, m]
             if share == 0.0:
                 continue
@@ -343,12 +362,11 @@ def share_velocity(field: Array, closed: Closed) -> None:
     """Give closed ones the velocity of all that goes with them, in place: their shares with their
     targets."""
     flat, (small, targets, shares) = field.reshape(-1), closed
-    shared = np.empty(small.size)
-    for n in range(small.size):
-        shared[n] = (1.0 - shares[n, 0] - shares[n, 1]) * flat[small[n]]
-        shared[n] += shares[n, 0] * flat[targets[n, 0]] + shares[n, 1] * flat[targets[n, 1]]
-    for n in range(small.size):
-        flat[small[n]] = shared[n]
+    for n in range(small.size - 1, -1, -1):
+        shared = 0.0
+        for m in range(6):
+            shared += shares[n, m] * flat[targets[n, m]]
+        flat[small[n]] = (1.0 - shares[n].sum()) * flat[small[n]] + shared
 
 
 @njit(nogil=True, cache=True)

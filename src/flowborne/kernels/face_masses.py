@@ -279,7 +279,7 @@ def share_out(
             between = openings(listed, kinds, axis, opened, cells, cell, faces)
             above[count], way[count], rest[count] = between
             count += 1
-    shut, lent = closed.faces, np.zeros(closed.shares.shape)
+    shut, lent = closed.faces, np.empty(closed.shares.shape)
     for turn in range(ROUNDS):
         for group in range(2):  # along its own axis, then all others together
             ways, gained = range(0, 1) if group == 0 else range(1, count), np.zeros(size)
@@ -290,16 +290,13 @@ def share_out(
                 held[n] += gained[n]
                 flat[listed[n]] = held[n]
             if turn == group == 0:  # what closes in a step comes in as it closes
-                for n in range(shut.size):
-                    for m in range(2):
-                        lent[n, m] = closed.shares[n, m] * flat[shut[n]]
-                merge_small(volume, closed)
+                lent = merge_small(volume, closed)
                 for n in range(size):
                     held[n] = flat[listed[n]]
     for n in range(shut.size):
-        if closed.shares[n, 0] + closed.shares[n, 1] > 0.0:
+        if closed.shares[n].any():
             flat[shut[n]] = 0.0
-    total = count * size + 2 * shut.size
+    total = count * size + lent.size
     givers, takers, amounts = np.empty(total, np.int64), np.empty(total, np.int64), np.empty(total)
     at = 0
     for m in range(count):
@@ -308,7 +305,7 @@ def share_out(
                 givers[at], takers[at] = listed[n], listed[above[m, n]]
                 amounts[at] = given[m, n]
                 at += 1
-    for m in range(2):
+    for m in range(6):
         for n in range(shut.size):
             if lent[n, m] != 0.0:
                 givers[at], takers[at], amounts[at] = shut[n], closed.targets[n, m], lent[n, m]

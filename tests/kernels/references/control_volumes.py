@@ -37,37 +37,33 @@ def find_targets_reference(
     cells: Array,
     component: int,
     wraps: Integers,
-) -> tuple[Integers, Array]:
-    """`find_targets` in NumPy."""
+    nothing: float,
+) -> Array:
+    """`find_targets` in NumPy: the share of each control volume (n, all) in each closed one."""
     beside = neighbours_reference(np.array(opened.shape), wraps)[:, small]
     driven = (beside >= 0) & (pushed.ravel()[beside] > 0)
     ends = [(int(axis == component),) * 2 for axis in range(3)]
     wide = np.pad(cells, ends, mode="wrap" if wraps[component] > 0 else "constant")
     own = np.unravel_index(small, opened.shape)
-    cell = np.stack(
-        [
-            wide[tuple(at + side * (axis == component) for axis, at in enumerate(own))]
-            for side in (0, 1)
-        ]
-    )
-    opposite = slice(2 * component, 2 * component + 2)
-    held = np.where(driven[opposite], cell * opened.ravel()[beside[opposite]], 0.0)
-    targets = np.where(held > 0.0, beside[opposite], small)
-    parts = held / np.where(held.sum(axis=0) > 0.0, held.sum(axis=0), 1.0)
-    near, touched = largest_reference(beside, np.where(driven, volumes.ravel()[beside], 0.0), 0.0)
-    alone = touched & ~parts.any(axis=0)
-    targets[0, alone], parts[0, alone] = near[alone], 1.0
+    ahead = np.zeros(beside.shape)
+    for side in (0, 1):
+        way = 2 * component + side
+        cell = wide[tuple(at + side * (axis == component) for axis, at in enumerate(own))]
+        ahead[way] = np.where(cell > nothing, cell, 0.0) * opened.ravel()[beside[way]]
+    ahead *= driven
+    around = np.where(driven, volumes.ravel()[beside], 0.0)
+    parts = np.where(ahead.any(axis=0), ahead, around)
     while True:
-        place = np.zeros(opened.size, np.int64)
-        place[small] = np.arange(small.size)
         led = (beside >= 0) & np.isin(beside, small[parts.any(axis=0)])
-        after, joined = largest_reference(
-            place[beside], np.where(led, volumes.ravel()[beside], -1.0), -1.0
-        )
-        new = joined & ~parts.any(axis=0)
+        joined = np.where(led, np.maximum(volumes.ravel()[beside], nothing), 0.0)
+        new = joined.any(axis=0) & ~parts.any(axis=0)
         if not new.any():
-            return targets.T, parts.T
-        targets[:, new], parts[:, new] = targets[:, after[new]], parts[:, after[new]]
+            break
+        parts[:, new] = joined[:, new]
+    shares = np.zeros((small.size, opened.size))
+    total = parts.sum(axis=0)
+    np.add.at(shares, (np.arange(small.size), beside), parts / np.where(total > 0.0, total, 1.0))
+    return shares
 
 
 def merge_small_reference(
@@ -75,9 +71,10 @@ def merge_small_reference(
 ) -> Array:
     """`merge_small` in NumPy: the amounts after it."""
     merged = amount.ravel().copy()
-    given = shares * merged[small][:, None]
-    np.add.at(merged, targets, given)
-    merged[small] -= given.sum(axis=1)
+    for f, to, share in zip(small, targets, shares, strict=True):
+        given = share * merged[f]
+        np.add.at(merged, to, given)
+        merged[f] -= given.sum()
     return merged.reshape(amount.shape)
 
 
@@ -131,8 +128,8 @@ def share_velocity_reference(
 ) -> Array:
     """`share_velocity` in NumPy: the field after it."""
     shared = field.ravel().copy()
-    others = (shares * shared[targets]).sum(axis=1)
-    shared[small] = (1.0 - shares.sum(axis=1)) * shared[small] + others
+    for f, to, share in zip(small[::-1], targets[::-1], shares[::-1], strict=True):
+        shared[f] = (1.0 - share.sum()) * shared[f] + share @ shared[to]
     return shared.reshape(field.shape)
 
 
