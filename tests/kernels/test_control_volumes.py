@@ -174,18 +174,30 @@ def test_what_is_on_either_side_of_a_thin_body_stays_there() -> None:
     np.testing.assert_allclose(of_all(closed, 5), [[0.0, 0.54 / 0.68, 0.0, 0.14 / 0.68, 0.0]])
 
 
-def test_what_a_solve_left_has_no_way_ahead() -> None:
-    """Two cells that a body covers, one with less than nothing left and one with a little more."""
-    cells, opened, volumes = np.zeros((4, 2, 1)), np.zeros((5, 2, 1)), np.zeros((5, 2, 1))
-    cells[:, 0, 0], cells[:, 1, 0] = (0.8, 1e-13, -1e-13, 0.8), 1.0
-    opened[[1, 3], 0], opened[:, 1] = 0.1, 1.0
-    volumes[:, 0, 0], volumes[:, 1] = (0.4, 0.4, 0.0, 0.4, 0.4), 1.0
+def test_what_has_no_way_ahead_goes_with_all_that_is_beside_it() -> None:
+    """A pocket of 0.6, closed beyond, is not joined through a body to a sliver of 0.2 behind it."""
+    cells, opened, volumes = np.zeros((4, 3, 1)), np.zeros((5, 3, 1)), np.zeros((5, 3, 1))
+    cells[:, 1, 0] = 0.0, 0.6, 0.2, 1.0
+    opened[3, 1], opened[2, [0, 2]] = 0.7, 0.4
+    volumes[3, 1], volumes[2, :, 0] = 0.6, (0.5, 0.4, 0.25)
     faces = FaceGrid(0, np.array(opened.shape), np.zeros(3, np.int64))
-    pushed = (opened > 0.0).astype(np.uint8)
-    closed = find_targets(np.array([2 * 2]), pushed, opened, volumes, cells, faces, 1e-9)
-    shares = of_all(closed, 10).reshape(5, 2)
-    np.testing.assert_allclose(shares[[1, 3], 0], 0.4 / 1.8)
-    np.testing.assert_allclose(shares[2, 1], 1.0 / 1.8)
+    pushed, small = (opened > 0.0).astype(np.uint8), np.array([2 * 3 + 1])
+    closed = find_targets(small, pushed, opened, volumes, cells, faces, 1e-9)
+    shares = of_all(closed, 15).reshape(5, 3)
+    np.testing.assert_allclose(shares[2], np.array([0.4, 0.0, 0.2]) / 0.74)
+    np.testing.assert_allclose(shares[3], [0.0, 0.14 / 0.74, 0.0])
+
+
+def test_what_a_solve_left_is_no_way_ahead() -> None:
+    """Cells that a body covers hold 1e-13 more or less than nothing."""
+    cells, opened, volumes = np.zeros((4, 2, 1)), np.zeros((5, 2, 1)), np.zeros((5, 2, 1))
+    cells[:, 0, 0] = 0.8, 1e-13, -1e-13, 0.8
+    opened[[1, 3], 0], opened[2, 1] = 0.1, 1.0
+    volumes[[1, 3], 0], volumes[2, 1] = 0.4, 1.0
+    faces = FaceGrid(0, np.array(opened.shape), np.zeros(3, np.int64))
+    pushed, small = (opened > 0.0).astype(np.uint8), np.array([2 * 2])
+    closed = find_targets(small, pushed, opened, volumes, cells, faces, 1e-9)
+    assert of_all(closed, 10)[0, 2 * 2 + 1] == 1.0
 
 
 @ROOM_OR_SLAB

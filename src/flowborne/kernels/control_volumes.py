@@ -168,8 +168,9 @@ def find_targets(
 
     A face that is wholly closed has a control volume where a cell beside it is open in part. What
     lies there goes along with the opposite faces of both cells, in proportion to their open parts
-    and to those of the cells; where both are closed with all open neighbours in proportion to their
-    volumes, else with closed ones that have targets, in the same way.
+    and to those of the cells; what lies in a cell whose opposite face is closed, with the open
+    neighbours across the other axes in proportion to their volumes, so that nothing passes through
+    a body. Where there are none of either, it goes with closed ones that have targets.
 
     small    (n,) closed faces with a volume
     kinds    of the faces, see `sort_faces`
@@ -188,6 +189,12 @@ def find_targets(
         targets[n, :] = f
         i, j, k = indices(shape, f)
         find_beside(beside, shape, wraps, f)
+        around, ahead, shut = 0.0, 0.0, 0.0
+        for way in range(6):
+            to = beside[way]
+            if way // 2 != component and to >= 0 and pushed[to] & DRIVEN:
+                targets[n, way], parts[n, way] = to, volume_flat[to]
+                around += volume_flat[to]
         for side in range(2):
             a = i - int(component == 0 and side == 0)
             b = j - int(component == 1 and side == 0)
@@ -204,12 +211,16 @@ def find_targets(
                 continue
             way = 2 * component + side
             to, volume = beside[way], cell_flat[(a * cell_shape[1] + b) * cell_shape[2] + c]
-            if to >= 0 and pushed[to] & DRIVEN and volume > nothing:
-                targets[n, way], parts[n, way] = to, open_flat[to] * volume
-        for way in range(6) if parts[n].sum() == 0.0 else range(0):
-            to = beside[way]
+            if volume <= nothing:
+                continue
             if to >= 0 and pushed[to] & DRIVEN:
-                targets[n, way], parts[n, way] = to, volume_flat[to]
+                targets[n, way], parts[n, way] = to, open_flat[to] * volume
+                ahead += parts[n, way]
+            else:
+                shut += volume
+        for way in range(6) if ahead > 0.0 and around > 0.0 else range(0):
+            if way // 2 != component:
+                parts[n, way] *= shut / around
         total = parts[n].sum()
         if total > 0.0:
             parts[n] /= total

@@ -45,14 +45,19 @@ def find_targets_reference(
     ends = [(int(axis == component),) * 2 for axis in range(3)]
     wide = np.pad(cells, ends, mode="wrap" if wraps[component] > 0 else "constant")
     own = np.unravel_index(small, opened.shape)
-    ahead = np.zeros(beside.shape)
+    ahead, shut = np.zeros(beside.shape), np.zeros(small.size)
     for side in (0, 1):
         way = 2 * component + side
         cell = wide[tuple(at + side * (axis == component) for axis, at in enumerate(own))]
-        ahead[way] = np.where(cell > nothing, cell, 0.0) * opened.ravel()[beside[way]]
-    ahead *= driven
-    around = np.where(driven, volumes.ravel()[beside], 0.0)
-    parts = np.where(ahead.any(axis=0), ahead, around)
+        cell = np.where(cell > nothing, cell, 0.0)
+        ahead[way] = np.where(driven[way], cell * opened.ravel()[beside[way]], 0.0)
+        shut += np.where(driven[way], 0.0, cell)
+    across = driven & (np.arange(6) // 2 != component)[:, None]
+    around = np.where(across, volumes.ravel()[beside], 0.0)
+    beside_it = around.sum(axis=0)
+    parts = ahead + around / np.where(beside_it > 0.0, beside_it, 1.0) * np.where(
+        ahead.any(axis=0), shut, 1.0
+    )
     while True:
         led = (beside >= 0) & np.isin(beside, small[parts.any(axis=0)])
         joined = np.where(led, np.maximum(volumes.ravel()[beside], nothing), 0.0)
