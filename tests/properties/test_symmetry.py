@@ -93,6 +93,26 @@ def test_cells_that_a_body_covers_mirrored() -> None:
     assert force < FORCE
 
 
+def test_edges_of_two_boxes_mirrored() -> None:
+    """Those that go through two opposite faces of a cell are not one edge."""
+    places = np.array([[0.01848, -0.17861, 0.19466], [-0.11407, -0.06203, 0.20183]])
+    pieces = tuple(
+        Piece(
+            kind="box",
+            size=np.array([0.1235, 0.0867, 0.10388]),
+            place=place,
+            turn=np.array([0.6973, -0.6279, 0.2701, 0.2157]),
+            joint=joint,
+            axis=np.array([0.0, 1.0, 1.0]),
+        )
+        for place, joint in zip(places, ("ball", "none"), strict=True)
+    )
+    case = Case((10, 11, 11), ("closed", "closed", "closed"), pieces, 1.0, 0.001, 3671)
+    flow, force = asymmetry(case, MIRRORS[2])
+    assert flow < FLOW
+    assert force < FORCE
+
+
 def test_a_disc_in_the_middle_of_two_cells_mirrored() -> None:
     disc = Piece(
         kind="cylinder",

@@ -95,12 +95,16 @@ def find_corners(distance: Array, found: Crossings, h: float) -> tuple[Integers,
                         i + int(axis == 0), j + int(axis == 1), k + int(axis == 2), high, scratch,
                     ):  # fmt: skip
                         continue
+                    same = low[1] @ high[1] + low[2] @ high[2] > low[1] @ high[2] + low[2] @ high[1]
+                    first = high[1 if same else 2]
+                    second = high[2 if same else 1]
+                    if low[1] @ first <= 0.0 or low[2] @ second <= 0.0:
+                        continue  # the edges of two walls that look opposite ways
                     cells[count, 0], cells[count, 1], cells[count, 2] = i, j, k
                     cells[count, 3] = axis
-                    same = low[1] @ high[1] + low[2] @ high[2] > low[1] @ high[2] + low[2] @ high[1]
                     corner[count, 0] = 0.5 * (low[0] + high[0])
-                    corner[count, 1] = 0.5 * (low[1] + high[1 if same else 2])
-                    corner[count, 2] = 0.5 * (low[2] + high[2 if same else 1])
+                    corner[count, 1] = 0.5 * (low[1] + first)
+                    corner[count, 2] = 0.5 * (low[2] + second)
                     count += 1
     return cells[:count], corner[:count]
 
