@@ -7,7 +7,7 @@ import pytest
 
 from flowborne import Simulation, load_scene
 from flowborne.machine import PARTS, cores
-from flowborne_validation.bench import frame_costs, speed, startup
+from flowborne_validation.bench import frame_costs, speed, startup, steps
 from flowborne_validation.bench.timing import frame_times
 
 COARSE = {"domain.resolution": "16", "controller.settle_steps": "0"}
@@ -71,6 +71,20 @@ def test_parts_of_a_frame_add_up():
     spent = [float(line.split()[1]) for line in result.lines]
     assert min(spent) >= 0.0
     assert sum(spent) == pytest.approx(result.value, abs=0.005 * len(spent))
+
+
+def test_steps_count_what_they_call_and_take():
+    coarse = {"domain.resolution": "16"}
+    for result in (
+        steps.of_room(load_scene("flyer-base", coarse), 1.0, frames=1),
+        steps.of_trials(load_scene(steps.BLOCK, coarse), 1.0, frames=1),
+    ):
+        assert result.value > 1.0
+        assert judged(result, met=False)
+        calls, memory = result.lines[-3:-1] if "flyer" in result.title else result.lines[-2:]
+        assert 100.0 < float(calls.split()[0]) < 20_000.0
+        assert float(memory.split()[0]) > 0.0
+    assert "of 18 steps" in result.lines[0]  # two trials of a move and eight steps to settle
 
 
 def test_memory_of_a_run_does_not_grow():

@@ -25,6 +25,7 @@ MODULES = {
     "size": "frame_costs",
     "memory": "frame_costs",
     "threads": "speed",
+    "steps": "steps",
     "first-run": "startup",
     "start": "startup",
 }
