@@ -55,7 +55,7 @@ class AdvectionResult:
 
 def leak_proof_transport(world: World, start: Departure, end: Geometry, dt: float) -> Transport:
     """Fluxes past the moving bodies, and the control volumes that they lead to at the cut `end`."""
-    flux, cells = leak_proof_flux(start, end, world.time + 0.5 * dt, dt)
+    flux, cells = leak_proof_flux(world, start, end, dt)
     volumes = control_volumes(cells, end.open, start.fluid.grid, start.fluid.boundaries)
     return Transport(flux, start.volumes, volumes, dt, world.time)
 
