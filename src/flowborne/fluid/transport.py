@@ -33,7 +33,7 @@ import numpy as np
 
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.control_volumes import NONE, NOTHING, ControlVolumes
-from flowborne.fluid.ghosts import edge, face_grid, packed_sides, plane, planes
+from flowborne.fluid.ghosts import edge, packed_sides, plane, planes
 from flowborne.fluid.grid import Grid
 from flowborne.kernels.arrays import Array, Faces, Integers, Marks
 from flowborne.kernels.carry import Exchange, Inlets, Scratch, Volumes, carry, prepare
@@ -153,7 +153,7 @@ def carry_component(
     along     what else it is given in the step, m/s^2; beside bodies it is set to 0; None for
               nothing
     """
-    count, faces = transport.substeps(grid), face_grid(component, grid, sides)
+    count, faces = transport.substeps(grid), sides.faces(component, grid)
     before, after, dt = transport.before, transport.after, transport.dt / count
     times = [transport.time + n * dt for n in range(count + 1)]
     table = packed_sides(component, grid, sides, times, transport.flux)

@@ -90,6 +90,7 @@ class Boundary:
                 velocity again after each substep
     endless     whether the fluid beyond is a sea, which answers the flow inside. An open side has
                 the same a, and nothing beyond it
+    steady      whether what it prescribes to the velocity never changes, whatever the flow
     """
 
     kind: ClassVar[str]
@@ -97,6 +98,7 @@ class Boundary:
     tangential: ClassVar[int] = FREE
     supplies: ClassVar[bool] = False
     endless: ClassVar[bool] = False
+    steady: ClassVar[bool] = False
 
     def among(self, pairs: Sequence[Pair]) -> Boundary:
         """The side in a domain whose sides are these, the lower and the upper one of each axis."""
