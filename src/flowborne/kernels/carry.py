@@ -25,6 +25,7 @@ from flowborne.kernels.control_volumes import (
     stride,
 )
 from flowborne.kernels.face_masses import add_transfers, give, place_of
+from flowborne.kernels.faces import flat
 from flowborne.kernels.flux import (
     CLEAR,
     CUT,
@@ -360,11 +361,10 @@ def join(u: Array, axis: int) -> None:
 @kernel
 def part_of_step(out: Array, start: Array, end: Array, part: float) -> None:
     """start + part (end - start)."""
-    one, other, both = start.reshape(-1), end.reshape(-1), out.reshape(-1)
-    size = one.size // start.shape[0]
-    for i in prange(start.shape[0]):
-        for n in range(i * size, (i + 1) * size):
-            both[n] = one[n] + part * (other[n] - one[n])
+    one, other, both = flat(start), flat(end), flat(out)
+    for i in prange(both.shape[0]):
+        for k in range(both.shape[1]):
+            both[i, k] = one[i, k] + part * (other[i, k] - one[i, k])
 
 
 @njit(nogil=True, cache=True)
