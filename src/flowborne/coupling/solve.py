@@ -37,7 +37,7 @@ from flowborne.coupling.operators import (
 from flowborne.coupling.report import Outcome, timed
 from flowborne.coupling.viscous_solve import diffuse
 from flowborne.coupling.world import Fluid, World
-from flowborne.fluid.grid import Grid, faces_of
+from flowborne.fluid.grid import Grid, copied
 from flowborne.fluid.projection import face_weights, pressure_gradient
 from flowborne.kernels.arrays import ROUNDING, Array, Faces, Integers
 from flowborne.kernels.faces import largest_open, largest_size
@@ -210,7 +210,7 @@ def solve_together(
             tried, driven = driven, changed
         tolerance = max(fluid.tolerance, TIGHTENING * tolerance)
         pressure = solution.pressure
-    after = faces_of([u.copy() for u in smooth])
+    after = copied(smooth, fluid.grid)
     gradient.subtract(after, solution.pressure, 1.0)
     left = unsettled(tried, changed, v)
     outcome = Outcome.DONE if changed is None else Outcome.NOT_SETTLED

@@ -145,6 +145,10 @@ class Boundaries:
     def normal(self) -> Integers:
         """(3, 2) a of the velocity across the lower and upper side of each axis: PRESCRIBED, FREE
         or PERIODIC."""
+        return self._normal
+
+    @cached_property
+    def _normal(self) -> Integers:
         return np.array([[side.normal for side in pair] for pair in self._pairs], np.int64)
 
     def sea(self, grid: Grid) -> Sea | None:

@@ -26,6 +26,11 @@ def inner_product(a: Array, b: Array) -> float:
     return float(np.einsum("ijk,ijk->", a, b))
 
 
+def copied(faces: Faces, grid: Grid) -> Faces:
+    """A copy; what does not flow, across a slab, is the same."""
+    return faces_of([faces[n].copy() if n in grid.axes else faces[n] for n in range(3)])
+
+
 @dataclass(frozen=True)
 class Grid:
     """Uniform MAC grid of cubic cells.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import ClassVar
 
 import numpy as np
@@ -29,7 +29,7 @@ class Place:
     axis: int
     upper: bool
 
-    @property
+    @cached_property
     def layer(self) -> Slices:
         """Index of the layer of a field that is next to the side, or of the faces on it."""
         layers = [slice(None)] * 3
