@@ -60,18 +60,13 @@ class Around:
 
     @cached_property
     def faces(self) -> list[FaceGrid]:
-        count, slab = np.array(self.grid.shape), self.grid.is_slab
-        wraps, ones, found = np.zeros(3, np.int64), np.eye(3, dtype=np.int64), []
-        for place, side in self.sides:
-            wraps[place.axis] = count[place.axis] * (side.normal == PERIODIC)
-        for axis in range(3):
-            shape = count + ones[axis]
-            if slab:  # one layer thick along the first of the kernels' axes
-                around = np.array([0, *wraps[:2]])
-                found.append(FaceGrid(axis + 1, np.array([1, *shape[:2]]), around))
-            else:
-                found.append(FaceGrid(axis, shape, wraps))
-        return found
+        rings = {place.axis for place, side in self.sides if side.normal == PERIODIC}
+        x, y, z = (n * (axis in rings) for axis, n in enumerate(self.grid.shape))
+        shapes = [self.grid.face_shape(axis) for axis in range(3)]
+        if not self.grid.is_slab:
+            return [FaceGrid(axis, shape, (x, y, z)) for axis, shape in enumerate(shapes)]
+        # one layer thick along the first of the kernels' axes
+        return [FaceGrid(n + 1, (1, *shape[:2]), (0, x, y)) for n, shape in enumerate(shapes)]
 
     @cached_property
     def layers(self) -> dict[tuple[int, int], Sides] | None:

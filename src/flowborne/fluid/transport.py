@@ -35,7 +35,7 @@ from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.control_volumes import NONE, NOTHING, ControlVolumes
 from flowborne.fluid.ghosts import edge, packed_sides, plane, planes
 from flowborne.fluid.grid import Grid
-from flowborne.kernels.arrays import Array, Faces, Integers, Marks
+from flowborne.kernels.arrays import Array, Faces, Integers, Marks, Three
 from flowborne.kernels.carry import Exchange, Inlets, Scratch, Volumes, carry
 from flowborne.kernels.control_volumes import Transfers, merged
 from flowborne.kernels.eddies import exchange, exchanges_near
@@ -173,8 +173,9 @@ def carry_component(
         NOTHING * grid.cell_volume,
     )
     rising = 0.0 if along is None else transport.extrapolated(grid)
-    fields = (plane(u, grid) for u in (out, velocity, velocity if along is None else along))
-    with borrowed(grid, faces.shape.tolist()) as scratch:
+    more = plane(velocity if along is None else along, grid)
+    fields = plane(out, grid), plane(velocity, grid), more
+    with borrowed(grid, faces.shape) as scratch:
         crossed, held, drained = carry(*fields, rising, volumes, exchange, scratch, dt)
     return Carried(out, crossed, held, drained)
 
@@ -183,7 +184,7 @@ _spare: dict[tuple[int, int, int], list[tuple[Array, Marks]]] = {}
 
 
 @contextmanager
-def borrowed(grid: Grid, shape: list[int]) -> Iterator[Scratch]:
+def borrowed(grid: Grid, shape: Three) -> Iterator[Scratch]:
     """Scratch for a component of this shape in the order of the kernels' axes, in memory that is
     kept for the next one."""
     store, deep = _spare.setdefault(grid.shape, []), 2 * GHOSTS

@@ -11,7 +11,16 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit, prange
 
-from flowborne.kernels.arrays import FREE, PERIODIC, PRESCRIBED, Array, FaceGrid, Integers, Marks
+from flowborne.kernels.arrays import (
+    FREE,
+    PERIODIC,
+    PRESCRIBED,
+    Array,
+    FaceGrid,
+    Integers,
+    Marks,
+    Three,
+)
 from flowborne.kernels.control_volumes import (
     Closed,
     Transfers,
@@ -122,7 +131,7 @@ class Scratch(NamedTuple):
 
 
 @njit(nogil=True, cache=True)
-def layer(row: Integers, field: Array, shape: Integers) -> tuple[int, int, int, int, int, int, int]:
+def layer(row: Integers, field: Array, shape: Three) -> tuple[int, int, int, int, int, int, int]:
     """Where the layer of a padded field inside a side lies: its first element, the steps outwards
     and along the other two axes, the numbers along them, and along its own."""
     strides, axis, first = np.empty(3, np.int64), row[AXIS], 0
@@ -194,9 +203,7 @@ def mark_volumes(marks: Marks, cut: Integers, sides: Sides, faces: FaceGrid) -> 
 
 
 @njit(nogil=True, cache=True)
-def add_side_rates(
-    total: Array, flux: Fluxes, axis: int, listed: Integers, shape: Integers
-) -> None:
+def add_side_rates(total: Array, flux: Fluxes, axis: int, listed: Integers, shape: Three) -> None:
     """Add volume per time that leaves listed control volumes through their sides across an axis,
     in place."""
     q, component = across_axis(flux.through, axis), flux.component
@@ -215,7 +222,7 @@ def add_side_rates(
 
 
 @njit(nogil=True, cache=True)
-def what_flows_out(exchange: Exchange, listed: Integers, shape: Integers) -> Array:
+def what_flows_out(exchange: Exchange, listed: Integers, shape: Three) -> Array:
     """(n,) volume per time that leaves listed control volumes through their sides, inlets and
     transfers."""
     total, inlets, given = np.zeros(listed.size), exchange.inlets, exchange.given
@@ -272,7 +279,7 @@ def cross_sides(sides: Sides, flux: Fluxes, cells: Array, faces: FaceGrid) -> No
 
 
 @njit(nogil=True, cache=True)
-def draw_in(padded: Padded, sides: Sides, shape: Integers) -> float:
+def draw_in(padded: Padded, sides: Sides, shape: Three) -> float:
     """Give what comes in through free sides its velocity, the mean of the layer beside it or one
     without vorticity, in the ghosts of a padded field; gives volume x velocity that comes in
     through all sides per time."""

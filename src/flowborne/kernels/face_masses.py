@@ -18,8 +18,8 @@ from flowborne.kernels.control_volumes import (
     Closed,
     Transfers,
     across_axis,
+    all_beside,
     both_beside,
-    find_beside,
     find_targets,
     indices,
     listed_kinds,
@@ -231,14 +231,13 @@ def with_neighbours(cut: Integers, kinds: Marks, faces: FaceGrid) -> Integers:
 
     kinds  of the faces; on return LISTED too where a face is in the list
     """
-    kind, beside = kinds.reshape(-1), np.empty(6, np.int64)
+    kind = kinds.reshape(-1)
     found, count = np.empty(7 * cut.size, np.int64), cut.size
     for n in range(count):
         found[n] = cut[n]
         kind[cut[n]] |= LISTED
     for f in cut:
-        find_beside(beside, faces.shape, faces.wraps, f)
-        for to in beside:
+        for to in all_beside(faces.shape, faces.wraps, f):
             if to >= 0 and kind[to] & DRIVEN and not kind[to] & LISTED:
                 kind[to] |= LISTED
                 found[count] = to
