@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import pickle
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from flowborne.coupling.world import Setup, World
 from flowborne.sim.frame import Snapshot
 from flowborne.sim.simulation import Simulation
 from flowborne.solids.dynamics import Kinematics
+from flowborne_validation.worlds import hold_all
 
 SMALL = {"domain.resolution": "32", "time.frames": "4"}
 
@@ -44,6 +46,23 @@ def test_a_trial_leaves_the_world_untouched(simulation: Simulation) -> None:
     values = trials.values(np.array([[0.1, 0.0], [0.0, -0.2], [0.3, 0.3]]))
     assert np.unique(values).size == 3
     assert bits(world) == before
+
+
+def test_what_is_kept_while_bodies_stand_changes_nothing(simulation: Simulation) -> None:
+    """A copy keeps none of it, and shares none of it."""
+    command, world = hold_all(simulation.world.setup.solid.nv), simulation.world.copy()
+    matrices = []
+    for _ in range(3):
+        other = world.copy()
+        for each in (world, other):
+            step(each, 0.02, command)
+        assert bits(other) == bits(world)
+        assert world.still is not None
+        assert other.still is not None
+        assert other.still[2] is not world.still[2]
+        matrices.append(world.still[2])
+    assert matrices[0] is matrices[1] is matrices[2]
+    assert pickle.loads(pickle.dumps(world)).still is None
 
 
 def test_a_decision_changes_nothing_but_the_controllers_memory(simulation: Simulation) -> None:

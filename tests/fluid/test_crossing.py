@@ -8,7 +8,7 @@ import pytest
 from flowborne.coupling.step import step
 from flowborne.coupling.world import Fluid, Setup, World
 from flowborne.fluid.boundary import Boundaries
-from flowborne.fluid.ghosts import face_grid, packed_sides
+from flowborne.fluid.ghosts import packed_sides
 from flowborne.fluid.grid import Grid, faces_of
 from flowborne.fluid.sides.kinds import BoundaryOpen
 from flowborne.fluid.transport import neighbours, planes
@@ -32,7 +32,7 @@ def test_what_comes_in_has_the_mean_velocity_and_what_leaves_its_own(
     flux = grid.zeros_faces()
     flux[0][-end] = random.normal(size=flux[0][-end].shape)
     u, cells = random.normal(size=grid.face_shape(component)), random.random(grid.shape)
-    faces = face_grid(component, grid, sides)
+    faces = sides.faces(component, grid)
     field = np.pad(u.reshape(faces.shape), [(GHOSTS * (n > 0),) * 2 for n in range(3)])
     table = packed_sides(component, grid, sides, [0.0], faces_of(flux))
     means = neighbours(u.shape[component], False)

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from flowborne.fluid.boundary import Boundaries
-from flowborne.fluid.ghosts import face_grid, impose_sides, packed_sides, plane
+from flowborne.fluid.ghosts import impose_sides, packed_sides, plane
 from flowborne.fluid.grid import Grid
+from flowborne.fluid.sides.far import BoundaryFar
 from flowborne.fluid.sides.kinds import (
     BoundaryClosed,
     BoundaryInflow,
@@ -19,6 +20,7 @@ from flowborne.fluid.sides.side import Boundary
 from flowborne.kernels.arrays import FREE, Array, Faces
 from flowborne.kernels.carry import fill_ghosts
 from flowborne.kernels.flux import GHOSTS
+from flowborne.motion.inflow import FactorRamp, FactorSteady, InflowProfile
 
 SLAB = Grid.slab(6, 5, 0.5, (0.0, 1.0))
 CUBE = Grid((6, 5, 4), 0.5, (0.0, 1.0, -1.0))
@@ -41,7 +43,7 @@ def with_ghosts(
     inside = plane(velocity[component], grid)
     field = np.pad(inside, [(GHOSTS * (n > 1),) * 2 for n in inside.shape])
     table = packed_sides(component, grid, sides, [time], grid.zeros_faces())
-    fill_ghosts(field, table, 0, face_grid(component, grid, sides))
+    fill_ghosts(field, table, 0, sides.faces(component, grid))
     return field
 
 
@@ -136,3 +138,18 @@ def test_sliding_is_along_the_wall_alone() -> None:
     velocity = random_faces(SLAB)
     impose_sides(velocity, SLAB, lid, 0.0)
     assert not velocity[1][:, -1].any()
+
+
+def test_what_steady_sides_prescribe_is_packed_once() -> None:
+    """What crosses them is each step's own."""
+    for factor, same in ((FactorSteady(), True), (FactorRamp(1.0), False)):
+        inflow = BoundaryInflow(InflowProfile((1.0, 0.5, 0.0), factor))
+        sides = Boundaries(inflow, BoundaryOpen(), BoundaryNoSlip())
+        first, later = (packed_sides(1, SLAB, sides, [t], SLAB.zeros_faces()) for t in (0.2, 0.7))
+        np.testing.assert_allclose(later.wall[0, : SLAB.face_shape(1)[1]], 0.5 * factor.at(0.7))
+        assert (first.wall is later.wall) == same
+        for values in (first.rate, first.share):
+            assert not np.shares_memory(values, later.rate)
+            assert not np.shares_memory(values, later.share)
+    x, y = (BoundaryFar(),) * 2, (BoundaryFar(),) * 2
+    assert Boundaries(*x, *y).steady_layers(SLAB) is None

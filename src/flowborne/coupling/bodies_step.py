@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from flowborne.coupling.drives import joint_command
-from flowborne.coupling.operators import generalised, twists
+from flowborne.coupling.operators import cross, generalised, twists
 from flowborne.coupling.report import StepReport, timed
 from flowborne.coupling.solve import solve_bodies
 from flowborne.coupling.step_report import report_bodies
@@ -100,7 +100,7 @@ def parts_of(world: World, velocity: Array, dt: float) -> int:
         turned = np.einsum("gij,gkj->gki", pose.geom_rotation[shapes.source], shapes.tips)
         at = turned + pose.geom_position[shapes.source][:, None]
         twist = twists(pose, velocity)[shapes.body][:, None]
-        speed = twist[..., :3] + np.cross(twist[..., 3:], at)
+        speed = twist[..., :3] + cross(twist[..., 3:], at)
         fastest = float(np.linalg.norm(speed, axis=-1).max())
     if pose.vertices.size:
         skin = (pose.vertex_jacobian @ velocity).reshape(-1, 3)

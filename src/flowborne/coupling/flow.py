@@ -25,10 +25,10 @@ from flowborne.fluid.boundary import cells_in
 from flowborne.fluid.control_volumes import ControlVolumes, control_volumes
 from flowborne.fluid.dye import Dyed, Passage, carry_dye
 from flowborne.fluid.ghosts import edge, impose_sides
-from flowborne.fluid.grid import Grid, faces_of
+from flowborne.fluid.grid import Grid, copied, faces_of
 from flowborne.fluid.projection import accelerated
 from flowborne.fluid.transport import Transport, carry_component, damp_eddies
-from flowborne.kernels.arrays import PERIODIC, Array, Faces
+from flowborne.kernels.arrays import PRESCRIBED, Array, Faces
 from flowborne.kernels.faces import changes_of_step, still_to_come
 from flowborne.solids.dynamics import Kinematics
 
@@ -55,7 +55,7 @@ class AdvectionResult:
 
 def leak_proof_transport(world: World, start: Departure, end: Geometry, dt: float) -> Transport:
     """Fluxes past the moving bodies, and the control volumes that they lead to at the cut `end`."""
-    flux, cells = leak_proof_flux(start, end, world.time + 0.5 * dt, dt)
+    flux, cells = leak_proof_flux(world, start, end, dt)
     volumes = control_volumes(cells, end.open, start.fluid.grid, start.fluid.boundaries)
     return Transport(flux, start.volumes, volumes, dt, world.time)
 
@@ -104,7 +104,7 @@ def advect_momentum(start: Departure, velocity: Faces, transport: Transport) -> 
         u = arrived[place.axis]
         before = u[place.layer].copy()
         side.impose(u, place, transport.time + dt)
-        if side.normal != PERIODIC:
+        if side.normal == PRESCRIBED:
             mass = fluid.density * transport.after.moving[place.axis][place.layer]
             stopped[place.axis] += float((mass * (u[place.layer] - before)).sum())
     return AdvectionResult(
@@ -127,7 +127,7 @@ def apply_body_force_and_sides(
     time  s at the end of the step
     """
     grid = fluid.grid
-    velocity = faces_of([u.copy() for u in advected])
+    velocity = copied(advected, grid)
     if any(fluid.body_force):
         rates = accelerated(opened, mass, grid, fluid.boundaries)
         for axis in grid.axes:

@@ -29,6 +29,7 @@ import numpy as np
 from flowborne.coupling.cut import Departure
 from flowborne.coupling.fractions import Geometry
 from flowborne.coupling.operators import beyond_sides
+from flowborne.coupling.world import World
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.control_volumes import NONE
 from flowborne.fluid.ghosts import impose_sides, plane, planes
@@ -59,13 +60,13 @@ of volume 0 counts as never filled with fluid, and would not pass on what flows 
 
 
 def leak_proof_flux(
-    departure: Departure, after: Geometry, time: float, dt: float
+    world: World, departure: Departure, after: Geometry, dt: float
 ) -> tuple[Faces, Array]:
     """Volume fluxes through all faces over a step, m^3/s, and the volumes that they lead to, m^3.
 
+    world      keeps the matrix while bodies stand
     departure  the start of the step
     after      the cut grid at its end
-    time       s in its middle
     """
     state, before, cells = departure.state, departure.cut, departure.volumes.cells
     grid, sides = departure.fluid.grid, departure.fluid.boundaries
@@ -77,15 +78,19 @@ def leak_proof_flux(
     dipoles = sides.dipoles(grid)
     places = [] if dipoles is None else dipoles.places
     uncut = [weights[p.axis][p.layer] == stiffness(grid) for p in places]
-    drive_sides(flux, weights, grid, sides, time)
+    drive_sides(flux, weights, grid, sides, world.time + 0.5 * dt)
     swept = swept_cells(before, after, cells, grid, sides)
     start, end = swept.set_aside(flux, weights, cells, after.volume)
-    if dipoles is not None:
-        through = [weights[p.axis][p.layer] > 0.0 for p in places]  # not of cells set aside
-        dipoles = dipoles.on([a & b for a, b in zip(uncut, through, strict=True)])
-    gradient = PressureGradient(weights, 2.0 * stiffness(grid), dipoles, grid, sides)
-    beyond = beyond_sides(dipoles, gradient.whole)
-    system = PressureSystem(weights, sides.periodic(), beyond=beyond)
+    if before is not after or world.still is None or world.still[0] is not after:
+        if dipoles is not None:
+            through = [weights[p.axis][p.layer] > 0.0 for p in places]  # not of cells set aside
+            dipoles = dipoles.on([a & b for a, b in zip(uncut, through, strict=True)])
+        gradient = PressureGradient(weights, 2.0 * stiffness(grid), dipoles, grid, sides)
+        beyond = beyond_sides(dipoles, gradient.whole)
+        system = PressureSystem(weights, sides.periodic(), beyond=beyond)
+        world.still = (after, gradient, system) if before is after else None
+    else:
+        _, gradient, system = world.still
     rhs, net = volume_rates(system, start, end, departure.rate, dt), np.empty(grid.shape)
     net_out(plane(net, grid), *planes(flux, grid))
     rhs += net

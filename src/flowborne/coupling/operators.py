@@ -21,6 +21,9 @@ from flowborne.kernels.sparse_rows import add_rows, sum_rows
 from flowborne.solids.dynamics import Kinematics
 from flowborne.solvers.pressure import NO_DENSE_TERM
 
+TURNED, AGAIN = np.array([1, 2, 0]), np.array([2, 0, 1])
+"""The axes, each of them a place and two places on."""
+
 
 def twists(kinematics: Kinematics, v: Array) -> Array:
     """(nbody, 6) twist of every body at generalised velocity v (nv,)."""
@@ -80,10 +83,15 @@ def pressure_push(geometry: Geometry, pressure: Array, size: int) -> Array:
     return sum_rows(np.ascontiguousarray(pressure), geometry.rows, size)
 
 
+def cross(a: Array, b: Array) -> Array:
+    """a x b over the last axis: what `np.cross` gives, without its search for axes."""
+    return a[..., TURNED] * b[..., AGAIN] - a[..., AGAIN] * b[..., TURNED]
+
+
 def buoyancy_wrench(centroid: Array, volume: Array, gravity: Array, density: float) -> Array:
     """(nbody, 6) Archimedes' force -rho g V at the centroid of each body's displaced volume."""
     force = -density * volume[:, None] * gravity[None, :]
-    return np.concatenate([force, np.cross(centroid, force)], axis=1)
+    return np.concatenate([force, cross(centroid, force)], axis=1)
 
 
 def beyond_sides(dipoles: Dipoles | None, strength: float) -> DenseTerm:

@@ -37,7 +37,7 @@ from flowborne.coupling.operators import (
 from flowborne.coupling.report import Outcome, timed
 from flowborne.coupling.viscous_solve import diffuse
 from flowborne.coupling.world import Fluid, World
-from flowborne.fluid.grid import Grid, faces_of
+from flowborne.fluid.grid import Grid, copied
 from flowborne.fluid.projection import face_weights, pressure_gradient
 from flowborne.kernels.arrays import ROUNDING, Array, Faces, Integers
 from flowborne.kernels.faces import largest_open, largest_size
@@ -95,8 +95,8 @@ class SolvedFlow(Solved):
     sides            (3,) impulse of the sides on the fluid, N s
     iterations       of the pressure solve, all turns of a step together
     residual         true relative residual
-    divergence       largest |net outflow of a cell| / volume, 1/s
-    fastest          largest |u+| on an open face, m/s
+    divergence       largest |net outflow of a cell| / volume, 1/s; nan in trials
+    fastest          largest |u+| on an open face, m/s; nan in trials
     """
 
     viscous_impulse: Array
@@ -210,9 +210,8 @@ def solve_together(
             tried, driven = driven, changed
         tolerance = max(fluid.tolerance, TIGHTENING * tolerance)
         pressure = solution.pressure
-    after = faces_of([u.copy() for u in smooth])
+    after = copied(smooth, fluid.grid)
     gradient.subtract(after, solution.pressure, 1.0)
-    moved = start + term.mobility.times(on_solids)
     left = unsettled(tried, changed, v)
     outcome = Outcome.DONE if changed is None else Outcome.NOT_SETTLED
     if not smoothed:
@@ -220,7 +219,11 @@ def solve_together(
     if not solution.converged:
         outcome = Outcome.PRESSURE_NOT_CONVERGED
     change = boundary_velocity(pose, v - driven.system.v)
-    added = np.full(change.size, np.nan)
+    added, divergence, fastest = np.full(change.size, np.nan), np.nan, np.nan
+    if not world.setup.trial:
+        moved = start + term.mobility.times(on_solids)
+        divergence = largest_divergence(after, cut, moved, rate, fluid)
+        fastest = max(largest_open(after[axis], cut.open[axis]) for axis in fluid.grid.axes)
     if world.setup.splits:
         plain = matrix
         if yielding.size:
@@ -241,8 +244,8 @@ def solve_together(
         sides=side_push(solution.pressure, cut.open, gradient),
         iterations=iterations,
         residual=solution.residual,
-        divergence=largest_divergence(after, cut, moved, rate, fluid),
-        fastest=max(largest_open(after[axis], cut.open[axis]) for axis in fluid.grid.axes),
+        divergence=divergence,
+        fastest=fastest,
     )
 
 

@@ -113,7 +113,7 @@ def step_coupled(world: World, dt: float, command: JointCommand) -> StepReport:
     mass = face_masses(advected.volumes, fluid.density)
     driven_sides = far.drive(advected, mass, cut.open, fluid)
     velocity = apply_body_force_and_sides(driven_sides.velocity, cut.open, mass, fluid, end, dt)
-    if not all(np.isfinite(u).all() for u in velocity):
+    if not all(np.isfinite(velocity[axis]).all() for axis in fluid.grid.axes):
         return report_failed(model, dt, Outcome.ADVECTION_NOT_FINITE)
     with timed("solids"):
         push, known = known_forces(world, pose, half.impulse, advected.jets, dt)

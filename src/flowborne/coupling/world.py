@@ -14,6 +14,7 @@ from flowborne.coupling.shapes import Shapes, shapes
 from flowborne.fluid.boundary import Boundaries, Source
 from flowborne.fluid.control_volumes import ControlVolumes
 from flowborne.fluid.grid import Grid
+from flowborne.fluid.projection import PressureGradient
 from flowborne.fluid.state import FluidState, under
 from flowborne.fluid.wake import wake_shape
 from flowborne.fluid.window import Window, crosses
@@ -21,6 +22,7 @@ from flowborne.kernels.arrays import Array
 from flowborne.solids.model import SolidModel, SolidState
 from flowborne.solids.trajectories import NOTHING_TOLD, Told, Trajectory
 from flowborne.solids.wind import Wind
+from flowborne.solvers.pressure import PressureSystem
 
 TRIAL_TOLERANCE = 1e-5
 """Relative residual of the pressure in a hypothetical step: gradients are right to 1e-3."""
@@ -137,6 +139,8 @@ class World:
     cut     the positions (nq,) for which the grid was cut last, and that cut: made from the state,
             and not part of it
     volumes the cut that the last step ended with, and its control volumes; likewise
+    still   the cut that did not change in the last step, and the gradient and the matrix of its
+            leak-proof projection, which a copy makes anew; likewise
     """
 
     setup: Setup
@@ -150,9 +154,12 @@ class World:
     told: Told = NOTHING_TOLD
     cut: tuple[Array, Geometry] | None = field(default=None, repr=False, compare=False)
     volumes: tuple[Geometry, ControlVolumes] | None = field(default=None, repr=False, compare=False)
+    still: tuple[Geometry, PressureGradient, PressureSystem] | None = field(
+        default=None, repr=False, compare=False
+    )
 
     def __getstate__(self) -> dict[str, object]:
-        return vars(self) | {"cut": None, "volumes": None}
+        return vars(self) | {"cut": None, "volumes": None, "still": None}
 
     @classmethod
     def at_rest(cls, setup: Setup) -> World:
@@ -178,7 +185,7 @@ class World:
     def copy(self) -> World:
         fluid = None if self.fluid is None else self.fluid.copy()
         memory = {name: values.copy() for name, values in self.memory.items()}
-        return replace(self, solid=self.solid.copy(), fluid=fluid, memory=memory)
+        return replace(self, solid=self.solid.copy(), fluid=fluid, memory=memory, still=None)
 
     def arrays(self) -> dict[str, Array]:
         """The whole state as named arrays; `from_arrays` is the way back, bit for bit."""

@@ -5,9 +5,9 @@ The sides are named x_min, x_max, y_min, y_max, z_min, z_max; `sides` has what e
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,7 +16,10 @@ from flowborne.fluid.grid import Grid
 from flowborne.fluid.sides.far import Sea, sea_of
 from flowborne.fluid.sides.kinds import BoundaryClosed
 from flowborne.fluid.sides.side import Boundary, Place
-from flowborne.kernels.arrays import FREE, PERIODIC, Integers
+from flowborne.kernels.arrays import FREE, PERIODIC, FaceGrid, Integers
+
+if TYPE_CHECKING:
+    from flowborne.kernels.carry import Sides
 
 WALL = BoundaryClosed()
 
@@ -49,6 +52,36 @@ class Source:
 
 
 @dataclass(frozen=True)
+class Around:
+    """The sides of one grid with their places, and what follows from them: see `Boundaries`."""
+
+    grid: Grid
+    sides: list[tuple[Place, Boundary]]
+
+    @cached_property
+    def faces(self) -> list[FaceGrid]:
+        rings = {place.axis for place, side in self.sides if side.normal == PERIODIC}
+        x, y, z = (n * (axis in rings) for axis, n in enumerate(self.grid.shape))
+        shapes = [self.grid.face_shape(axis) for axis in range(3)]
+        if not self.grid.is_slab:
+            return [FaceGrid(axis, shape, (x, y, z)) for axis, shape in enumerate(shapes)]
+        # one layer thick along the first of the kernels' axes
+        return [FaceGrid(n + 1, (1, *shape[:2]), (0, x, y)) for n, shape in enumerate(shapes)]
+
+    @cached_property
+    def layers(self) -> dict[tuple[int, int], Sides] | None:
+        return {} if all(side.steady for _, side in self.sides) else None
+
+    @cached_property
+    def sea(self) -> Sea | None:
+        return sea_of(self.sides)
+
+    @cached_property
+    def dipoles(self) -> Dipoles | None:
+        return dipoles_of(self.sides)
+
+
+@dataclass(frozen=True)
 class Boundaries:
     """The six sides of a domain.
 
@@ -78,6 +111,10 @@ class Boundaries:
 
     def periodic(self) -> tuple[bool, bool, bool]:
         """Of each axis."""
+        return self._periodic
+
+    @cached_property
+    def _periodic(self) -> tuple[bool, bool, bool]:
         x, y, z = (low.normal == PERIODIC for low, _ in self._pairs)
         return x, y, z
 
@@ -87,36 +124,48 @@ class Boundaries:
         pairs = list(zip(sides[::2], sides[1::2], strict=True))
         return tuple((low.among(pairs), high.among(pairs)) for low, high in pairs)
 
-    def around(self, grid: Grid) -> Iterator[tuple[Place, Boundary]]:
+    def around(self, grid: Grid) -> list[tuple[Place, Boundary]]:
         """Every side of a grid, with its place: along each axis the lower and then the upper."""
-        for place in places(grid):
-            yield place, self._pairs[place.axis][place.upper]
+        return self._on(grid).sides
+
+    def faces(self, axis: int, grid: Grid) -> FaceGrid:
+        """The faces of a grid across an axis, as kernels take them."""
+        return self._on(grid).faces[axis]
+
+    def steady_layers(self, grid: Grid) -> dict[tuple[int, int], Sides] | None:
+        """What steady sides prescribe to the velocity, to be filled by `ghosts.packed_sides`; None
+        where one of a grid is not steady."""
+        return self._on(grid).layers
 
     def normal(self) -> Integers:
         """(3, 2) a of the velocity across the lower and upper side of each axis: PRESCRIBED, FREE
         or PERIODIC."""
+        return self._normal
+
+    @cached_property
+    def _normal(self) -> Integers:
         return np.array([[side.normal for side in pair] for pair in self._pairs], np.int64)
 
     def sea(self, grid: Grid) -> Sea | None:
         """The sea around a grid; raises ValueError as `sea_of` does."""
-        return self._beyond(grid)[0]
+        return self._on(grid).sea
 
     def dipoles(self, grid: Grid) -> Dipoles | None:
         """What far sides of a grid answer to dipoles besides their columns; see `dipoles_of`."""
-        return self._beyond(grid)[1]
+        return self._on(grid).dipoles
 
-    def _beyond(self, grid: Grid) -> tuple[Sea | None, Dipoles | None]:
+    def _on(self, grid: Grid) -> Around:
         found = self._known.get(grid)
         if found is None:
-            sides = list(self.around(grid))
-            found = sea_of(sides), dipoles_of(sides)
+            sides = [(place, self._pairs[place.axis][place.upper]) for place in places(grid)]
+            found = Around(grid, sides)
             if len(self._known) >= KEPT:
                 self._known.clear()
             self._known[grid] = found
         return found
 
     @cached_property
-    def _known(self) -> dict[Grid, tuple[Sea | None, Dipoles | None]]:
+    def _known(self) -> dict[Grid, Around]:
         return {}
 
     def has_free_side(self, grid: Grid) -> bool:

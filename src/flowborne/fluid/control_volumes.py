@@ -19,18 +19,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from flowborne.fluid.boundary import Boundaries
-from flowborne.fluid.ghosts import edge, face_grid, plane, planes
+from flowborne.fluid.ghosts import edge, plane, planes
 from flowborne.fluid.grid import Grid, faces_of, inner_product
 from flowborne.kernels.arrays import Array, Faces, Integers
-from flowborne.kernels.control_volumes import (
-    Closed,
-    Transfers,
-    find_targets,
-    listed_kinds,
-    share_velocity,
-    sort_faces,
-)
-from flowborne.kernels.face_masses import ROUNDS, share_out, with_neighbours
+from flowborne.kernels.control_volumes import Closed, Transfers, share_velocity
+from flowborne.kernels.face_masses import find_moving
 from flowborne.kernels.faces import weighted_change
 
 NOTHING = 1e-9
@@ -87,21 +80,12 @@ def moving_volumes(
     component: int, cells: Array, opened: Faces, grid: Grid, boundaries: Boundaries
 ) -> tuple[Array, Integers, Closed, Transfers]:
     """What moves with the faces across an axis, and what `ControlVolumes` has of them."""
-    faces = face_grid(component, grid, boundaries)
-    axis, shape, wraps = faces
+    faces, found = boundaries.faces(component, grid), np.empty(grid.face_shape(component))
     ends, cell = boundaries.normal()[component], grid.cell_volume
-    room, wide = plane(cells, grid), planes(opened, grid)
-    found, kinds = np.empty(grid.face_shape(component)), np.empty(shape, np.uint8)
-    volume = plane(found, grid)
-    counts = np.empty((shape[0] * shape[1], 3), np.int64)
     limits = cell, WHOLE, SLACK * cell, NOTHING * cell
-    sort_faces(volume, kinds, counts, room, wide[axis], axis, ends, limits)
-    cut, shut, uneven = listed_kinds(kinds, counts)
-    closed = find_targets(shut, kinds, wide[axis], volume, room, faces, NOTHING * cell)
-    for _ in range(ROUNDS):
-        uneven = np.sort(with_neighbours(uneven, kinds, faces))
-    given = share_out(volume, closed, kinds, uneven, room, wide, faces, cell)
-    if wraps[axis] > 0:
+    fields = plane(found, grid), plane(cells, grid), planes(opened, grid)
+    cut, closed, given = find_moving(*fields, faces, ends, limits)
+    if boundaries.periodic()[component]:
         found[edge(component, -1)] = found[edge(component, 0)]
     return found, cut, closed, given
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.grid import Grid
 from flowborne.fluid.sides.side import tangential_change
-from flowborne.kernels.arrays import PRESCRIBED, FaceGrid, Faces
+from flowborne.kernels.arrays import PRESCRIBED, Faces
 from flowborne.kernels.carry import Sides
 
 Scalar = TypeVar("Scalar", bound=np.generic)
@@ -38,15 +38,6 @@ def planes(faces: Faces, grid: Grid) -> Faces:
     return (plane(x, grid), plane(x, grid), plane(y, grid)) if grid.is_slab else (x, y, z)
 
 
-def face_grid(component: int, grid: Grid, sides: Boundaries) -> FaceGrid:
-    """The faces across an axis."""
-    wraps = np.array(grid.shape, np.int64) * np.array(sides.periodic(), np.int64)
-    shape = np.array(grid.face_shape(component))
-    if not grid.is_slab:
-        return FaceGrid(component, shape, wraps)
-    return FaceGrid(component + 1, np.array([1, *shape[:2]]), np.array([0, *wraps[:2]]))
-
-
 def impose_sides(velocity: Faces, grid: Grid, boundaries: Boundaries, time: float) -> None:
     """Set the normal velocity on the sides that prescribe it, and join periodic ends."""
     for place, side in boundaries.around(grid):
@@ -61,6 +52,10 @@ def packed_sides(
 
     flux  volume per time through each face, m^3/s
     """
+    kept = boundaries.steady_layers(grid)
+    if kept is not None and (component, len(times)) in kept:
+        known = kept[component, len(times)]
+        return known._replace(rate=np.zeros(known.rate.size), share=np.zeros(known.rate.size))
     table, walls, changes, first = [], [], [], 0
     shape = grid.face_shape(component)
     for place, side in boundaries.around(grid):
@@ -85,4 +80,7 @@ def packed_sides(
         changes.append(change.reshape(-1))
         first += size
     wide, along = np.concatenate(walls, axis=1), np.concatenate(changes)
-    return Sides(np.array(table, np.int64), wide, along, np.zeros(first), np.zeros(first))
+    made = Sides(np.array(table, np.int64), wide, along, np.zeros(first), np.zeros(first))
+    if kept is not None:
+        kept[component, len(times)] = made
+    return made

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -23,6 +24,11 @@ def inner_product(a: Array, b: Array) -> float:
     processes use the cores.
     """
     return float(np.einsum("ijk,ijk->", a, b))
+
+
+def copied(faces: Faces, grid: Grid) -> Faces:
+    """A copy; what does not flow, across a slab, is the same."""
+    return faces_of([faces[n].copy() if n in grid.axes else faces[n] for n in range(3)])
 
 
 @dataclass(frozen=True)
@@ -52,25 +58,25 @@ class Grid:
         origin[axis] += cells * self.spacing
         return replace(self, origin=(origin[0], origin[1], origin[2]))
 
-    @property
+    @cached_property
     def is_slab(self) -> bool:
         return self.shape[2] == 1
 
-    @property
+    @cached_property
     def depth(self) -> float:
         """Extent of a cell in z that enters areas and volumes: 1 in a slab, else h."""
         return 1.0 if self.is_slab else self.spacing
 
-    @property
+    @cached_property
     def cell_volume(self) -> float:
         return self.spacing**2 * self.depth
 
-    @property
+    @cached_property
     def face_area(self) -> float:
         """Area of a face across x or y (and across z in three dimensions)."""
         return self.spacing * self.depth
 
-    @property
+    @cached_property
     def axes(self) -> tuple[int, ...]:
         """Axes along which fluid can move."""
         return (0, 1) if self.is_slab else (0, 1, 2)

@@ -14,12 +14,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.dipoles import Dipoles
 from flowborne.fluid.ghosts import plane
-from flowborne.fluid.grid import Grid, faces_of
+from flowborne.fluid.grid import Grid
 from flowborne.kernels.arrays import Array, Faces
 from flowborne.kernels.faces import accelerate, weigh
 from flowborne.kernels.projection import subtract_gradient
@@ -34,9 +32,9 @@ def accelerated(opened: Faces, mass: Faces, grid: Grid, boundaries: Boundaries) 
 
     mass  of each face, kg; 0 where no pressure acts
     """
-    rates = faces_of([np.empty(o.shape) for o in opened])
-    for rate, part, m in zip(rates, opened, mass, strict=True):
-        accelerate(rate, part, m, grid.face_area)
+    rates = grid.zeros_faces()
+    for axis in grid.axes:
+        accelerate(rates[axis], opened[axis], mass[axis], grid.face_area)
     for place, side in boundaries.around(grid):
         rates[place.axis][place.layer] *= side.pressure_weight(place)
     return rates
@@ -44,9 +42,9 @@ def accelerated(opened: Faces, mass: Faces, grid: Grid, boundaries: Boundaries) 
 
 def face_weights(opened: Faces, rate: Faces, grid: Grid) -> Faces:
     """Weights w = a A rate of the pressure matrix, of a A / m; see the module."""
-    weights = faces_of([np.empty(o.shape) for o in opened])
-    for weight, part, of_face in zip(weights, opened, rate, strict=True):
-        weigh(weight, part, of_face, grid.face_area)
+    weights = grid.zeros_faces()
+    for axis in grid.axes:
+        weigh(weights[axis], opened[axis], rate[axis], grid.face_area)
     return weights
 
 

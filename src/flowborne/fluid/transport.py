@@ -33,12 +33,12 @@ import numpy as np
 
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.control_volumes import NONE, NOTHING, ControlVolumes
-from flowborne.fluid.ghosts import edge, face_grid, packed_sides, plane, planes
+from flowborne.fluid.ghosts import edge, packed_sides, plane, planes
 from flowborne.fluid.grid import Grid
-from flowborne.kernels.arrays import Array, Faces, Integers, Marks
-from flowborne.kernels.carry import Exchange, Inlets, Scratch, Volumes, carry, prepare
+from flowborne.kernels.arrays import Array, Faces, Integers, Marks, Three
+from flowborne.kernels.carry import Exchange, Inlets, Scratch, Volumes, carry
 from flowborne.kernels.control_volumes import Transfers, merged
-from flowborne.kernels.eddies import edges_near, exchange, exchanges
+from flowborne.kernels.eddies import exchange, exchanges_near
 from flowborne.kernels.flux import GHOSTS, Fluxes, Padded, largest_crossing
 
 COURANT = 0.8
@@ -153,7 +153,7 @@ def carry_component(
     along     what else it is given in the step, m/s^2; beside bodies it is set to 0; None for
               nothing
     """
-    count, faces = transport.substeps(grid), face_grid(component, grid, sides)
+    count, faces = transport.substeps(grid), sides.faces(component, grid)
     before, after, dt = transport.before, transport.after, transport.dt / count
     times = [transport.time + n * dt for n in range(count + 1)]
     table = packed_sides(component, grid, sides, times, transport.flux)
@@ -161,38 +161,30 @@ def carry_component(
     means = neighbours(int(faces.shape[faces.component]), ring)
     flux = Fluxes(planes(transport.flux, grid), faces.component, *means)
     given = passed_on(before.transfers[component], after.transfers[component], transport.dt)
-    exchange = Exchange(flux, table, inlets, given)
-    cut = merged(before.cut[component], after.cut[component])[0]
-    out = np.empty(velocity.shape)
-    fields = plane(out, grid), plane(velocity, grid), plane(velocity, grid)
-    with borrowed(grid, faces.shape.tolist()) as scratch:
-        marks, cells = scratch.padded.marks, plane(before.cells, grid)
-        leaving = prepare(marks, cells, cut, exchange, faces)
-        volumes = Volumes(
-            plane(before.moving[component], grid),
-            plane(after.moving[component], grid),
-            cut,
-            leaving,
-            before.closed[component],
-            after.closed[component],
-            faces,
-            NOTHING * grid.cell_volume,
-        )
-        if along is not None:
-            along.reshape(-1)[cut] = 0.0
-            if ring:
-                along[edge(component, -1)] = along[edge(component, 0)]
-            fields = *fields[:2], plane(along, grid)
-        rising = 0.0 if along is None else transport.extrapolated(grid)
-        crossed, held_back, drained = carry(*fields, rising, volumes, exchange, scratch, dt)
-    return Carried(out, crossed, held_back, drained)
+    exchange, out = Exchange(flux, table, inlets, given), np.empty(velocity.shape)
+    volumes = Volumes(
+        plane(before.cells, grid),
+        plane(before.moving[component], grid),
+        plane(after.moving[component], grid),
+        merged(before.cut[component], after.cut[component])[0],
+        before.closed[component],
+        after.closed[component],
+        faces,
+        NOTHING * grid.cell_volume,
+    )
+    rising = 0.0 if along is None else transport.extrapolated(grid)
+    more = plane(velocity if along is None else along, grid)
+    fields = plane(out, grid), plane(velocity, grid), more
+    with borrowed(grid, faces.shape) as scratch:
+        crossed, held, drained = carry(*fields, rising, volumes, exchange, scratch, dt)
+    return Carried(out, crossed, held, drained)
 
 
 _spare: dict[tuple[int, int, int], list[tuple[Array, Marks]]] = {}
 
 
 @contextmanager
-def borrowed(grid: Grid, shape: list[int]) -> Iterator[Scratch]:
+def borrowed(grid: Grid, shape: Three) -> Iterator[Scratch]:
     """Scratch for a component of this shape in the order of the kernels' axes, in memory that is
     kept for the next one."""
     store, deep = _spare.setdefault(grid.shape, []), 2 * GHOSTS
@@ -219,16 +211,14 @@ def passed_on(before: Transfers, after: Transfers, dt: float) -> Transfers:
 def damp_eddies(velocity: Faces, transport: Transport, grid: Grid, sides: Boundaries) -> None:
     """Even out the circulation near faces cut at the end of a step, in place."""
     fields, volumes = planes(velocity, grid), planes(transport.after.moving, grid)
-    count, cut, periodic = np.array(grid.shape), transport.after.cut, np.array(sides.periodic())
+    cut, wraps = transport.after.cut, sides.faces(0, grid).wraps
     if grid.is_slab:
-        count, cut, periodic = np.roll(count, 1), (NONE, *cut[:2]), np.roll(periodic, 1)
+        cut = NONE, *cut[:2]
     rate, found = UPWIND_DAMPING * transport.dt / grid.spacing, []
     for axis in range(1 if grid.is_slab else 3):
-        one, other = (axis + 1) % 3, (axis + 2) % 3
-        number = np.zeros(count + (np.arange(3) != axis), np.int32)
-        u, v, held = fields[one], fields[other], (volumes[one], volumes[other])
-        near = edges_near(number, held, (cut[one], cut[other]), axis, count * periodic, GHOSTS)
-        found.append((u, v, held, *near[:2], exchanges(u, v, *near, rate)))
+        own = (axis + 1) % 3, (axis + 2) % 3
+        flow, held, listed = (tuple(f[a] for a in own) for f in (fields, volumes, cut))
+        found.append((*flow, held, *exchanges_near(flow, held, listed, axis, wraps, GHOSTS, rate)))
     for each in found:
         exchange(*each)
     for axis in grid.axes:

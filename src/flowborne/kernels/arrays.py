@@ -85,17 +85,21 @@ class Nodes(NamedTuple):
     flat: bool
 
 
+Three = tuple[int, int, int]
+"""One number per axis: arrays would have their references counted for every place of a list."""
+
+
 class FaceGrid(NamedTuple):
     """The faces across one axis, and their control volumes, in the order of the kernels' axes.
 
     component  that axis
-    shape      (3,) of fields on them
-    wraps      (3,) how many distinct ones there are along each periodic axis, else 0
+    shape      of fields on them
+    wraps      how many distinct ones there are along each periodic axis, else 0
     """
 
     component: int
-    shape: Integers
-    wraps: Integers
+    shape: Three
+    wraps: Three
 
 
 Point = tuple[float, float, float]

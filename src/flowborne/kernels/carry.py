@@ -11,7 +11,16 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit, prange
 
-from flowborne.kernels.arrays import FREE, PERIODIC, PRESCRIBED, Array, FaceGrid, Integers, Marks
+from flowborne.kernels.arrays import (
+    FREE,
+    PERIODIC,
+    PRESCRIBED,
+    Array,
+    FaceGrid,
+    Integers,
+    Marks,
+    Three,
+)
 from flowborne.kernels.control_volumes import (
     Closed,
     Transfers,
@@ -25,6 +34,7 @@ from flowborne.kernels.control_volumes import (
     stride,
 )
 from flowborne.kernels.face_masses import add_transfers, give, place_of
+from flowborne.kernels.faces import flat
 from flowborne.kernels.flux import (
     CLEAR,
     CUT,
@@ -65,18 +75,18 @@ class Sides(NamedTuple):
 class Volumes(NamedTuple):
     """Control volumes of one component in a step.
 
+    cells            volumes of the cells at its start
     before, after    volumes that move with them at both ends
     cut              (n,) those that are cut at one of them
-    leaving          (n,) volume per time that leaves each
     was_shut, shut   closed ones at both ends
     faces            whose they are
     nothing          volume up to which one holds nothing
     """
 
+    cells: Array
     before: Array
     after: Array
     cut: Integers
-    leaving: Array
     was_shut: Closed
     shut: Closed
     faces: FaceGrid
@@ -121,7 +131,7 @@ class Scratch(NamedTuple):
 
 
 @njit(nogil=True, cache=True)
-def layer(row: Integers, field: Array, shape: Integers) -> tuple[int, int, int, int, int, int, int]:
+def layer(row: Integers, field: Array, shape: Three) -> tuple[int, int, int, int, int, int, int]:
     """Where the layer of a padded field inside a side lies: its first element, the steps outwards
     and along the other two axes, the numbers along them, and along its own."""
     strides, axis, first = np.empty(3, np.int64), row[AXIS], 0
@@ -193,9 +203,7 @@ def mark_volumes(marks: Marks, cut: Integers, sides: Sides, faces: FaceGrid) -> 
 
 
 @njit(nogil=True, cache=True)
-def add_side_rates(
-    total: Array, flux: Fluxes, axis: int, listed: Integers, shape: Integers
-) -> None:
+def add_side_rates(total: Array, flux: Fluxes, axis: int, listed: Integers, shape: Three) -> None:
     """Add volume per time that leaves listed control volumes through their sides across an axis,
     in place."""
     q, component = across_axis(flux.through, axis), flux.component
@@ -214,7 +222,7 @@ def add_side_rates(
 
 
 @njit(nogil=True, cache=True)
-def what_flows_out(exchange: Exchange, listed: Integers, shape: Integers) -> Array:
+def what_flows_out(exchange: Exchange, listed: Integers, shape: Three) -> Array:
     """(n,) volume per time that leaves listed control volumes through their sides, inlets and
     transfers."""
     total, inlets, given = np.zeros(listed.size), exchange.inlets, exchange.given
@@ -271,21 +279,7 @@ def cross_sides(sides: Sides, flux: Fluxes, cells: Array, faces: FaceGrid) -> No
 
 
 @njit(nogil=True, cache=True)
-def prepare(
-    marks: Marks, cells: Array, cut: Integers, exchange: Exchange, faces: FaceGrid
-) -> Array:
-    """`Volumes.leaving`; the marks and what crosses the sides are set in place.
-
-    cells  volumes at the start
-    cut    see `Volumes`
-    """
-    mark_volumes(marks, cut, exchange.sides, faces)
-    cross_sides(exchange.sides, exchange.flux, cells, faces)
-    return what_flows_out(exchange, cut, faces.shape)
-
-
-@njit(nogil=True, cache=True)
-def draw_in(padded: Padded, sides: Sides, shape: Integers) -> float:
+def draw_in(padded: Padded, sides: Sides, shape: Three) -> float:
     """Give what comes in through free sides its velocity, the mean of the layer beside it or one
     without vorticity, in the ghosts of a padded field; gives volume x velocity that comes in
     through all sides per time."""
@@ -374,19 +368,18 @@ def join(u: Array, axis: int) -> None:
 @kernel
 def part_of_step(out: Array, start: Array, end: Array, part: float) -> None:
     """start + part (end - start)."""
-    one, other, both = start.reshape(-1), end.reshape(-1), out.reshape(-1)
-    size = one.size // start.shape[0]
-    for i in prange(start.shape[0]):
-        for n in range(i * size, (i + 1) * size):
-            both[n] = one[n] + part * (other[n] - one[n])
+    one, other, both = flat(start), flat(end), flat(out)
+    for i in prange(both.shape[0]):
+        for k in range(both.shape[1]):
+            both[i, k] = one[i, k] + part * (other[i, k] - one[i, k])
 
 
 @njit(nogil=True, cache=True)
-def settle(later: Array, high: Array, volumes: Volumes, span: float, nought: Array) -> None:
+def settle(later: Array, high: Array, volumes: Volumes, leaving: Array, nought: Array) -> None:
     """Give what closed control volumes got to their targets, and mix what is too small, in place.
 
-    high  volumes after the stage
-    span  s, of the substep
+    high     volumes after the stage
+    leaving  (n,) volume that leaves each that is cut in the substep
     """
     (shut, targets, _), held = volumes.shut, high.reshape(-1)
     was = np.empty((shut.size, 7))
@@ -395,7 +388,6 @@ def settle(later: Array, high: Array, volumes: Volumes, span: float, nought: Arr
         for m in range(6):
             was[n, m] = held[targets[n, m]]
     join_small(later, high, volumes.shut, volumes.nothing)
-    leaving = span * volumes.leaving
     level(later, high, volumes.cut, leaving, nought, volumes.nothing, volumes.faces)
     for n in range(shut.size):
         held[shut[n]] = was[n, 6]
@@ -444,10 +436,19 @@ def carry(
     sides, what inflows gave to what was carried to them, and (n,) what left at each inlet.
 
     u      at the start
-    along  what else it is given, velocity per time, times `rising`
+    along  what else it is given, velocity per time, times `rising`; on return 0 where it is cut
     dt     s, of each substep
     """
     faces, sides, inlets = volumes.faces, exchange.sides, exchange.inlets
+    mark_volumes(scratch.padded.marks, volumes.cut, sides, faces)
+    cross_sides(sides, exchange.flux, volumes.cells, faces)
+    out_of_cut = dt * what_flows_out(exchange, volumes.cut, faces.shape)
+    if rising > 0.0:
+        given = along.reshape(-1)
+        for f in volumes.cut:
+            given[f] = 0.0
+        if faces.wraps[faces.component] > 0:
+            join(along, faces.component)
     padded, middle, count = scratch.padded, scratch.middle, len(sides.wall) - 1
     start, later = (out, scratch.start) if count % 2 == 0 else (scratch.start, out)
     low = volumes.before
@@ -476,7 +477,7 @@ def carry(
             add_transfers(now, source, exchange.given)
             if turn == 1:
                 held += empty_at_walls(now, sides, faces)
-            settle(target, high, volumes, dt, scratch.nought)
+            settle(target, high, volumes, out_of_cut, scratch.nought)
             crossed += 0.5 * dt * came
             drained += 0.5 * dt * leaving
         if s < count - 1:

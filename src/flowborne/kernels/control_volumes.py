@@ -11,7 +11,16 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit, prange
 
-from flowborne.kernels.arrays import PERIODIC, PRESCRIBED, Array, FaceGrid, Faces, Integers, Marks
+from flowborne.kernels.arrays import (
+    PERIODIC,
+    PRESCRIBED,
+    Array,
+    FaceGrid,
+    Faces,
+    Integers,
+    Marks,
+    Three,
+)
 from flowborne.kernels.faces import mean_row
 from flowborne.kernels.jit import inlined, kernel
 
@@ -30,7 +39,7 @@ class Closed(NamedTuple):
     """Faces of one component that pressure does not push; what they hold goes to their targets.
 
     faces    (n,) flat; one that is a target comes after those that give to it
-    targets  (n, 6) flat, beside each, see `find_beside`; itself where that is none
+    targets  (n, 6) flat, beside each, see `all_beside`; itself where that is none
     shares   (n, 6) of each target
     """
 
@@ -60,7 +69,7 @@ def across_axis(faces: Faces, axis: int) -> Array:
 
 
 @inlined
-def indices(shape: Integers, f: int) -> tuple[int, int, int]:
+def indices(shape: Three | Integers, f: int) -> tuple[int, int, int]:
     """(i, j, k) of a flat index; divided in 32 bits, as 64 take longer."""
     row = int(np.int64(np.uint32(f) // np.uint32(shape[2])))
     i = int(np.int64(np.uint32(row) // np.uint32(shape[1])))
@@ -68,7 +77,7 @@ def indices(shape: Integers, f: int) -> tuple[int, int, int]:
 
 
 @inlined
-def stride(shape: Integers, axis: int) -> int:
+def stride(shape: Three | Integers, axis: int) -> int:
     """Places between neighbours along an axis in a flat field."""
     return shape[1] * shape[2] if axis == 0 else (shape[2] if axis == 1 else 1)
 
@@ -94,24 +103,22 @@ def both_beside(f: int, at: int, step: int, count: int, ring: int) -> tuple[int,
 
 
 @inlined
-def find_beside(beside: Integers, shape: Integers, wraps: Integers, f: int) -> None:
-    """Set `beside` (6,) to the flat indices of the control volumes beside f: 2 axis for the one
-    below, 2 axis + 1 for the one above, see `both_beside`.
+def all_beside(shape: Three, wraps: Three, f: int) -> tuple[int, int, int, int, int, int]:
+    """Flat indices of the control volumes beside f: 2 axis for the one below, 2 axis + 1 for the
+    one above, see `both_beside`. An array of them takes six times as long.
 
     wraps  (3,) number of distinct volumes along each periodic axis, else 0
     """
     i, j, k = indices(shape, f)
-    beside[0], beside[1] = both_beside(f, i, shape[1] * shape[2], shape[0], wraps[0])
-    beside[2], beside[3] = both_beside(f, j, shape[2], shape[1], wraps[1])
-    beside[4], beside[5] = both_beside(f, k, 1, shape[2], wraps[2])
+    a, b = both_beside(f, i, shape[1] * shape[2], shape[0], wraps[0])
+    c, d = both_beside(f, j, shape[2], shape[1], wraps[1])
+    return (a, b, c, d, *both_beside(f, k, 1, shape[2], wraps[2]))
 
 
 @njit(nogil=True, cache=True)
-def neighbour(shape: Integers, wraps: Integers, f: int, way: int) -> int:
-    """Flat index of one control volume beside f; `way` as in `find_beside`."""
-    beside = np.empty(6, np.int64)
-    find_beside(beside, shape, wraps, f)
-    return int(beside[way])
+def neighbour(shape: Three | Integers, wraps: Three | Integers, f: int, way: int) -> int:
+    """Flat index of one control volume beside f; `way` as in `all_beside`."""
+    return int(all_beside(shape, wraps, f)[way])
 
 
 @njit(nogil=True, cache=True)
@@ -182,13 +189,13 @@ def find_targets(
     targets, parts = np.empty((small.size, 6), np.int64), np.zeros((small.size, 6))
     turn, last = np.full(small.size, -1), 0
     (component, shape, wraps), cell_shape = faces, np.array(cells.shape)
-    volume_flat, beside = volumes.reshape(-1), np.empty(6, np.int64)
-    open_flat, cell_flat, pushed = opened.reshape(-1), cells.reshape(-1), kinds.reshape(-1)
+    volume_flat, open_flat = volumes.reshape(-1), opened.reshape(-1)
+    cell_flat, pushed = cells.reshape(-1), kinds.reshape(-1)
     for n in range(small.size):
         f = small[n]
         targets[n, :] = f
         i, j, k = indices(shape, f)
-        find_beside(beside, shape, wraps, f)
+        beside = all_beside(shape, wraps, f)
         around, ahead, shut = 0.0, 0.0, 0.0
         for way in range(6):
             to = beside[way]
@@ -231,7 +238,7 @@ def find_targets(
         for n in range(small.size):
             if turn[n] >= 0:
                 continue
-            find_beside(beside, shape, wraps, small[n])
+            beside = all_beside(shape, wraps, small[n])
             for way in range(6):
                 to = beside[way]
                 at = place_of(small, to, 0) if to >= 0 else small.size
@@ -296,14 +303,13 @@ def fill_empty(
     field: Array, volumes: Array, listed: Integers, nothing: float, faces: FaceGrid
 ) -> None:
     """Give listed control volumes that hold nothing the mean of those beside them, in place."""
-    flat, volume, beside = field.reshape(-1), volumes.reshape(-1), np.empty(6, np.int64)
+    flat, volume = field.reshape(-1), volumes.reshape(-1)
     for n in range(listed.size):
         f = listed[n]
         if volume[f] > nothing:
             continue
         total, weight = 0.0, 0.0
-        find_beside(beside, faces.shape, faces.wraps, f)
-        for to in beside:
+        for to in all_beside(faces.shape, faces.wraps, f):
             if to >= 0 and volume[to] > nothing:
                 total += volume[to] * flat[to]
                 weight += volume[to]
@@ -335,15 +341,13 @@ def level(
     flat, volume, total = field.reshape(-1), volumes.reshape(-1), nought.reshape(-1)
     found, count = np.empty((2, listed.size), np.int64), 0
     part, whole, exchange = np.empty(listed.size), np.empty(listed.size), np.empty(listed.size)
-    beside = np.empty(6, np.int64)
     for n in range(listed.size):
         f = listed[n]
         own = volume[f]
         if own <= nothing or leaving[n] <= 2.0 * own:
             continue
         best, largest = np.int64(-1), own
-        find_beside(beside, faces.shape, faces.wraps, f)
-        for to in beside:
+        for to in all_beside(faces.shape, faces.wraps, f):
             if to >= 0 and volume[to] > largest:
                 best, largest = to, volume[to]
         if best >= 0:

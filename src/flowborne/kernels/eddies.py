@@ -154,6 +154,25 @@ def exchanges(
 
 
 @njit(nogil=True, cache=True)
+def exchanges_near(
+    flow: tuple[Array, Array],
+    volumes: tuple[Array, Array],
+    cut: tuple[Integers, Integers],
+    axis: int,
+    wraps: Integers,
+    reach: int,
+    rate: float,
+) -> tuple[Integers, Integers, Array]:
+    """Faces and places of `edges_near`, and what these edges give of the velocities `flow`, see
+    `exchanges`."""
+    (u, v), n = flow, np.array(flow[0].shape)
+    n[(axis + 2) % 3] += 1
+    number = np.zeros((n[0], n[1], n[2]), np.int32)
+    faces, beside, least = edges_near(number, volumes, cut, axis, wraps, reach)
+    return faces, beside, exchanges(u, v, faces, beside, least, rate)
+
+
+@njit(nogil=True, cache=True)
 def exchange(
     u: Array, v: Array, volumes: tuple[Array, Array], faces: Integers, beside: Integers,
     given: Array,

@@ -18,15 +18,18 @@ from flowborne.kernels.control_volumes import (
     Closed,
     Transfers,
     across_axis,
+    all_beside,
     both_beside,
-    find_beside,
+    find_targets,
     indices,
+    listed_kinds,
     merge_small,
     place_of,
+    sort_faces,
     stride,
 )
 from flowborne.kernels.flux import Stage, in_line
-from flowborne.kernels.jit import inlined
+from flowborne.kernels.jit import inlined, kernel
 
 KEPT = 0.5
 """Part of the smaller of what one holds and of a h^3 that it keeps at least in a sweep."""
@@ -228,14 +231,13 @@ def with_neighbours(cut: Integers, kinds: Marks, faces: FaceGrid) -> Integers:
 
     kinds  of the faces; on return LISTED too where a face is in the list
     """
-    kind, beside = kinds.reshape(-1), np.empty(6, np.int64)
+    kind = kinds.reshape(-1)
     found, count = np.empty(7 * cut.size, np.int64), cut.size
     for n in range(count):
         found[n] = cut[n]
         kind[cut[n]] |= LISTED
     for f in cut:
-        find_beside(beside, faces.shape, faces.wraps, f)
-        for to in beside:
+        for to in all_beside(faces.shape, faces.wraps, f):
             if to >= 0 and kind[to] & DRIVEN and not kind[to] & LISTED:
                 kind[to] |= LISTED
                 found[count] = to
@@ -311,3 +313,30 @@ def share_out(
                 givers[at], takers[at], amounts[at] = shut[n], closed.targets[n, m], lent[n, m]
                 at += 1
     return Transfers(givers[:at].copy(), takers[:at].copy(), amounts[:at].copy())
+
+
+@kernel
+def find_moving(
+    volume: Array,
+    cells: Array,
+    opened: Faces,
+    faces: FaceGrid,
+    ends: Integers,
+    limits: tuple[float, float, float, float],
+) -> tuple[Integers, Closed, Transfers]:
+    """What moves with the faces of a component, in `volume`; gives those that are cut, the closed
+    ones, and what control volumes gave to others.
+
+    cells         volume of each cell
+    ends, limits  see `sort_faces`
+    """
+    component, shape, _ = faces
+    kinds = np.empty((shape[0], shape[1], shape[2]), np.uint8)
+    counts, own = np.empty((shape[0] * shape[1], 3), np.int64), across_axis(opened, component)
+    sort_faces(volume, kinds, counts, cells, own, component, ends, limits)
+    cut, shut, uneven = listed_kinds(kinds, counts)
+    closed = find_targets(shut, kinds, own, volume, cells, faces, limits[3])
+    for _ in range(ROUNDS):
+        uneven = with_neighbours(uneven, kinds, faces)
+        uneven.sort()
+    return cut, closed, share_out(volume, closed, kinds, uneven, cells, opened, faces, limits[0])

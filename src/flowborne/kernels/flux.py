@@ -249,13 +249,19 @@ def pad_field(out: Array, values: Array, along: Array, time: float) -> None:
 @kernel
 def largest_crossing(qx: Array, qy: Array, qz: Array) -> float:
     """Largest volume per time that crosses a cell, the axes added up."""
-    n0, n1, n2 = qy.shape[0], qx.shape[1], qx.shape[2]
-    most = np.zeros(n0)
-    for i in prange(n0):
-        for j in range(n1):
-            for k in range(n2):
-                rate = max(abs(qx[i, j, k]), abs(qx[i + 1, j, k]))
-                rate += max(abs(qy[i, j, k]), abs(qy[i, j + 1, k]))
-                rate += max(abs(qz[i, j, k]), abs(qz[i, j, k + 1]))
-                most[i] = max(most[i], rate)
+    (n0, n1), room = qy.shape[:2], qx.shape[2] > 1
+    x, y, z = qx, qy, qz
+    if not room:  # a slab's rows along y
+        x = y = qx.reshape((1, n0 + 1, qx.shape[1]))
+        z = qy.reshape((1, n0, n1))
+    most = np.zeros(z.shape[0])
+    for i in prange(z.shape[0]):
+        row = np.zeros(y.shape[2])
+        for j in range(z.shape[1]):
+            for k in range(row.size):
+                rate = max(abs(x[i, j, k]), abs(x[i + 1, j, k])) if room else 0.0
+                rate += max(abs(y[i, j, k]), abs(y[i, j + 1, k]))
+                rate += max(abs(z[i, j, k]), abs(z[i, j, k + 1]))
+                row[k] = max(row[k], rate)
+        most[i] = row.max()
     return float(most.max())

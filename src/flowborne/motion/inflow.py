@@ -100,6 +100,11 @@ class InflowProfile:
     factor: Factor
     spans: tuple[Span, ...] = ()
 
+    @property
+    def steady(self) -> bool:
+        """Whether it never changes."""
+        return isinstance(self.factor, FactorSteady)
+
     def __call__(self, x: Array, y: Array, z: Array, time: float) -> tuple[Array, Array, Array]:
         """(u, v, w) in m/s at points in m and a time in s."""
         part = np.full(np.broadcast(x, y, z).shape, self.factor.at(time))

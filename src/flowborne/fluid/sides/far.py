@@ -75,6 +75,7 @@ class BoundaryFar(BoundaryOpen):
     centre: Centre = (0.5, 0.5, 0.5)
     kind = "far"
     endless = True
+    steady = False  # what comes in is as the flow inside has it
 
     def among(self, pairs: Sequence[Pair]) -> BoundaryFar:
         """Raises ValueError when nothing is open or far across other axes, or another far side has

@@ -15,6 +15,7 @@ class BoundaryClosed(Boundary):
     """Free-slip wall: beyond it the field is mirrored."""
 
     kind = "closed"
+    steady = True
 
 
 @dataclass(frozen=True)
@@ -24,6 +25,7 @@ class BoundaryNoSlip(Boundary):
     velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
     kind = "no-slip"
     tangential = PRESCRIBED
+    steady = True
 
     def prescribed_velocity(self, place: Place, component: int, time: float) -> float:
         return self.velocity[component] if component != place.axis else 0.0
@@ -31,13 +33,20 @@ class BoundaryNoSlip(Boundary):
 
 @dataclass(frozen=True)
 class BoundaryInflow(Boundary):
-    """Velocity given by `profile`; carried scalars enter with the values in `scalars`."""
+    """Velocity given by `profile`; carried scalars enter with the values in `scalars`.
+
+    It is steady if the profile has an attribute of that name that says so.
+    """
 
     profile: Profile
     scalars: dict[str, ScalarProfile] = field(default_factory=dict)
     kind = "inflow"
     tangential = PRESCRIBED
     supplies = True
+
+    @property
+    def steady(self) -> bool:  # type: ignore[override]
+        return getattr(self.profile, "steady", False)
 
     def prescribed_velocity(self, place: Place, component: int, time: float) -> Array:
         return np.asarray(self.profile(*place.face_coordinates(component), time)[component], float)
@@ -60,6 +69,7 @@ class BoundaryOpen(Boundary):
 
     kind = "open"
     normal = FREE
+    steady = True
 
 
 @dataclass(frozen=True)
@@ -68,3 +78,4 @@ class BoundaryPeriodic(Boundary):
 
     kind = "periodic"
     normal = tangential = PERIODIC
+    steady = True

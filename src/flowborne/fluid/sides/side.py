@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import ClassVar
 
 import numpy as np
@@ -29,7 +29,7 @@ class Place:
     axis: int
     upper: bool
 
-    @property
+    @cached_property
     def layer(self) -> Slices:
         """Index of the layer of a field that is next to the side, or of the faces on it."""
         layers = [slice(None)] * 3
@@ -90,6 +90,7 @@ class Boundary:
                 velocity again after each substep
     endless     whether the fluid beyond is a sea, which answers the flow inside. An open side has
                 the same a, and nothing beyond it
+    steady      whether what it prescribes to the velocity never changes, whatever the flow
     """
 
     kind: ClassVar[str]
@@ -97,6 +98,7 @@ class Boundary:
     tangential: ClassVar[int] = FREE
     supplies: ClassVar[bool] = False
     endless: ClassVar[bool] = False
+    steady: ClassVar[bool] = False
 
     def among(self, pairs: Sequence[Pair]) -> Boundary:
         """The side in a domain whose sides are these, the lower and the upper one of each axis."""
