@@ -12,7 +12,7 @@ from flowborne.coupling.flow import AdvectionResult
 from flowborne.coupling.half_pressure import HalfPressure
 from flowborne.coupling.mouths import Jet, jet_wrench
 from flowborne.coupling.operators import buoyancy_wrench
-from flowborne.coupling.report import FIELDS, Outcome, StepReport
+from flowborne.coupling.report import FIELDS, Asked, Outcome, StepReport
 from flowborne.coupling.solve import Solved, SolvedFlow
 from flowborne.coupling.stream import winds_on
 from flowborne.coupling.world import World
@@ -29,7 +29,8 @@ WRENCHES = [name for name in FIELDS if name.endswith("_wrench")]
 def fluid_forces(model: SolidModel, value: float) -> dict[str, Any]:
     """What a report says of forces on bodies where all are `value`: 0, or nan if not known."""
     wrench = np.full((model.nbody, 6), value)
-    return dict.fromkeys(WRENCHES, wrench) | {"centre": wrench[:, :3]}
+    around = {"centre": wrench[:, :3], "added_mass": Asked(lambda: wrench, kept=True)}
+    return dict.fromkeys(WRENCHES, wrench) | around
 
 
 def report_failed(model: SolidModel, dt: float, outcome: Outcome) -> StepReport:
@@ -99,12 +100,17 @@ def report_coupled(
     mass   Faces, of the fluid at the end of the step, kg
     known  what the report says of forces known before the solve, and of dyes
     """
-    flesh = world.setup.solid.flesh
+    flesh, added = world.setup.solid.flesh, solved.added_mass
+
+    def added_mass() -> Array:
+        return on_bodies(pose, flesh, (added() if callable(added) else added) / dt)
+
+    world.splitting = (*world.splitting, added_mass)
     known |= momentum_budget(world, mass, half, advected, solved) | {
         "centre": pose.mass_centre,
         "pressure_wrench": on_bodies(pose, flesh, (solved.impulse + half.impulse) / dt),
         "viscous_wrench": on_bodies(pose, flesh, solved.viscous_impulse / dt),
-        "added_mass_wrench": on_bodies(pose, flesh, solved.added_mass / dt),
+        "added_mass": Asked(added_mass, kept=not callable(added)),
         "solver_iterations": solved.iterations,
         "residual": solved.residual,
         "divergence": solved.divergence,
