@@ -91,9 +91,10 @@ def test_what_is_asked_for_later_or_by_many_frames_is_the_same() -> None:
     assert frames[0] == frames[1]
 
 
-def test_a_hypothetical_step_splits_nothing():
+def test_a_hypothetical_step_tells_motions_and_forces_alone():
     world = world_with(Boundaries())
     world.setup = world.setup.hypothetical
     report = driven(world, 0.2)
     assert np.isnan(report.added_mass_wrench).all()
+    assert np.isnan([*report.momentum_fluid, report.divergence, report.fastest]).all()
     assert np.isfinite(report.pressure_wrench).all()

@@ -35,7 +35,7 @@ class HalfPressure:
     pressure  (nx, ny, nz) of which it is made, Pa
     impulse   (k,) on the bodies, see `SolvedFlow`
     sides     (3,) impulse of the sides on the fluid, N s
-    start     (3,) momentum of the fluid without it, N s
+    start     (3,) momentum of the fluid without it, N s; nan without balances
     """
 
     velocity: Faces
@@ -58,7 +58,9 @@ def explicit_half_pressure(world: World, start: Departure, dt: float) -> HalfPre
     fluid, state = world.flow()
     grid, sides, opened = fluid.grid, fluid.boundaries, start.cut.open
     mass = face_masses(start.volumes, fluid.density)
-    momentum = fluid_momentum(state.velocity, mass, grid, sides)
+    momentum = np.full(3, np.nan)
+    if world.setup.balances:
+        momentum = fluid_momentum(state.velocity, mass, grid, sides)
     size = 6 * world.setup.solid.nbody + start.cut.skins.vertices.size
     if sides.gain_energy(grid) or sea_changes(world, dt) or moved_since(world):
         still = np.zeros(grid.shape), np.zeros(size), np.zeros(3)

@@ -111,7 +111,8 @@ class StepReport:
 
     Momenta and impulses are linear, (3,), N s. Errors of their exchange and of the budget are
     relative to the impulses given to bodies and faces, added up in size. The history has columns
-    of the same names, with a suffix for the unit, of all from `work` to `fastest`.
+    of the same names, with a suffix for the unit, of all from `work` to `fastest`. In trials
+    momenta, their errors, `divergence` and `fastest` are nan.
 
     dt               s
     velocity         (nv,) at the end of the step: v is that half a step before, then half a step

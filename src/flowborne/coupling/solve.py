@@ -97,8 +97,8 @@ class SolvedFlow(Solved):
     sides            (3,) impulse of the sides on the fluid, N s
     iterations       of the pressure solve, all turns of a step together
     residual         true relative residual
-    divergence       largest |net outflow of a cell| / volume, 1/s
-    fastest          largest |u+| on an open face, m/s
+    divergence       largest |net outflow of a cell| / volume, 1/s; nan without balances
+    fastest          largest |u+| on an open face, m/s; likewise
     """
 
     viscous_impulse: Array
@@ -214,7 +214,6 @@ def solve_together(
         pressure = solution.pressure
     after = faces_of([u.copy() for u in smooth])
     gradient.subtract(after, solution.pressure, 1.0)
-    moved = start + term.mobility.times(on_solids)
     left = unsettled(tried, changed, v)
     outcome = Outcome.DONE if changed is None else Outcome.NOT_SETTLED
     if not smoothed:
@@ -224,9 +223,14 @@ def solve_together(
     change = boundary_velocity(pose, v - driven.system.v)
     plain = partial(PressureSystem, weights, fluid.boundaries.periodic(), beyond=beyond)
     added_mass: Array | Callable[[], Array] = partial(added_mass_impulse, plain, cut, change)
-    if not world.setup.balances:
+    divergence = fastest = np.nan
+    if world.setup.balances:
+        moved = start + term.mobility.times(on_solids)
+        divergence = largest_divergence(after, cut, moved, rate, fluid)
+        fastest = max(largest_open(after[axis], cut.open[axis]) for axis in fluid.grid.axes)
+    else:
         added_mass = np.full(change.size, np.nan)
-    elif world.setup.splits:
+    if world.setup.splits:
         added_mass = added_mass_impulse(plain if yielding.size else lambda: matrix, cut, change)
     return SolvedFlow(
         driven,
@@ -243,8 +247,8 @@ def solve_together(
         sides=side_push(solution.pressure, cut.open, gradient),
         iterations=iterations,
         residual=solution.residual,
-        divergence=largest_divergence(after, cut, moved, rate, fluid),
-        fastest=max(largest_open(after[axis], cut.open[axis]) for axis in fluid.grid.axes),
+        divergence=divergence,
+        fastest=fastest,
     )
 
 

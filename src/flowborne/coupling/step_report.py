@@ -24,6 +24,12 @@ from flowborne.solids.model import SolidModel
 from flowborne.solids.momentum import halfway_momentum
 
 WRENCHES = [name for name in FIELDS if name.endswith("_wrench")]
+UNKNOWN = {
+    name: np.full(3, np.nan) if made.axes else np.nan
+    for name, made in FIELDS.items()
+    if name.startswith("momentum_")
+}
+"""What reports say of momenta without balances."""
 
 
 def fluid_forces(model: SolidModel, value: float) -> dict[str, Any]:
@@ -47,6 +53,9 @@ def report_bodies(world: World, dt: float, solved: Solved, known: dict[str, Any]
     before, model = solved.driven.system.v, world.setup.solid
     velocity = 0.5 * (before + solved.v)
     actuator = solved.actuator + world.told.force_on(model.nv)
+    balance = UNKNOWN
+    if world.setup.balances:
+        balance = {"momentum_solid": halfway_momentum(model, world.solid, dt)[0]}
     return StepReport(
         dt,
         solved.outcome if np.isfinite(solved.v).all() else Outcome.NOT_FINITE,
@@ -54,11 +63,10 @@ def report_bodies(world: World, dt: float, solved: Solved, known: dict[str, Any]
         (solved.v - before) / dt,
         actuator,
         work=dt * float(actuator @ velocity),
-        momentum_solid=halfway_momentum(model, world.solid, dt)[0],
         contacts=solved.driven.system.contacts,
         limited=solved.driven.limited.nonzero()[0],
         unsettled=solved.unsettled,
-        **fluid_forces(model, 0.0) | known,
+        **fluid_forces(model, 0.0) | balance | known,
     )
 
 
@@ -106,7 +114,9 @@ def report_coupled(
         return on_bodies(pose, flesh, (added() if callable(added) else added) / dt)
 
     world.splitting = (*world.splitting, added_mass)
-    known |= momentum_budget(world, mass, half, advected, solved) | {
+    if world.setup.balances:
+        known |= momentum_budget(world, mass, half, advected, solved)
+    known |= {
         "centre": pose.mass_centre,
         "pressure_wrench": on_bodies(pose, flesh, (solved.impulse + half.impulse) / dt),
         "viscous_wrench": on_bodies(pose, flesh, solved.viscous_impulse / dt),

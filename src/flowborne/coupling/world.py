@@ -74,7 +74,8 @@ class Setup:
     winds    simple winds (paper eq. 2, or a uniform force)
     mouths   patches of skin through which fluid is expelled; needs a fluid that is not one-way
     trial    whether steps are hypothetical, and may be longer than those of the world itself
-    balances whether steps report more than motions and forces on bodies; else that is nan
+    balances whether steps report momenta, divergence, the fastest flow and the added-mass part of
+             forces; else they are nan, as in trials
     splits   whether the added-mass part of the fluid's force, which costs a solve, is split off in
              each step; else when its report is asked for it, and the matrix is then made again
     basis    a setup of the same bodies on the same grid, whose shapes are those of this one
@@ -96,7 +97,7 @@ class Setup:
         fluid = self.fluid
         if fluid is not None:
             fluid = replace(fluid, tolerance=max(fluid.tolerance, TRIAL_TOLERANCE))
-        return self.but(fluid=fluid, trial=True, balances=False)
+        return self.but(fluid=fluid, trial=True, balances=False, splits=False)
 
     @property
     def rehearsed(self) -> Setup:
