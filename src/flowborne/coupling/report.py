@@ -44,6 +44,9 @@ mean = partial(np.mean, axis=0)
 total = partial(np.sum, axis=0)
 
 
+LATE = "forces are split when asked, which is too late now: ask before the next frame or step"
+
+
 class Asked:
     """Wrenches (nbody, 6) that are made when they are first asked for.
 
@@ -58,12 +61,8 @@ class Asked:
 
     def __call__(self) -> Array:
         if not self.done:
-            make = self._make()
-            if make is None:
-                raise ValueError(
-                    "the added-mass part of a force is solved for when it is asked for, which is "
-                    "too late now: ask before the next frame or step"
-                )
+            if (make := self._make()) is None:
+                raise ValueError(LATE)
             self._value, self.done = make(), True
         return self._value
 
