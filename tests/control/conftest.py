@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from flowborne.coupling.report import Outcome, StepReport
+from flowborne.coupling.report import Asked, Outcome, StepReport
 from flowborne.coupling.world import Setup, World
 from flowborne.solids.model import SolidModel
 from flowborne.solids.trajectories import JointCommand
@@ -54,9 +54,11 @@ def move_only(world: World, dt: float, command: JointCommand | None = None) -> S
     state.v[:] = np.where(command.prescribed, command.final_velocity, state.v)
     world.time += dt
     world.steps += 1
-    none = [np.zeros((model.nbody, 6))] * 6
+    none = [np.zeros((model.nbody, 6))] * 5
+    added = Asked(lambda: none[0])
     centre = np.zeros((model.nbody, 3))
-    return StepReport(dt, Outcome.DONE, world.solid.v, *[np.zeros(model.nv)] * 2, *none, centre)
+    drives = [np.zeros(model.nv)] * 2
+    return StepReport(dt, Outcome.DONE, world.solid.v, *drives, *none, added, centre)
 
 
 @pytest.fixture

@@ -20,7 +20,7 @@ from flowborne.control.objective_kinds import (
 )
 from flowborne.control.objectives import ObjectiveCallable, ObjectiveSum, WeightedObjective
 from flowborne.control.phases import PhaseIntervals
-from flowborne.coupling.report import Outcome, StepReport
+from flowborne.coupling.report import Asked, Outcome, StepReport
 from flowborne.coupling.world import World
 
 MakeWorld = Callable[..., World]
@@ -36,7 +36,8 @@ def measured(make_world: MakeWorld) -> Measurement:
     rng = np.random.default_rng(1)
     wrench = rng.normal(size=(5, 4, 6))
     told = np.zeros(3), np.zeros(3), np.array([3.0, -4.0, 12.0]), *wrench
-    report = StepReport(0.05, Outcome.DONE, *told, np.zeros((4, 6)), np.zeros((4, 3)))
+    none = Asked(lambda: np.zeros((4, 6)))
+    report = StepReport(0.05, Outcome.DONE, *told, none, np.zeros((4, 3)))
     return Measurement(world, report)
 
 

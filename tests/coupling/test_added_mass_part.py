@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from flowborne import FrameReport, Grid, StepReport
+from flowborne import FrameReport, Grid, Simulation, StepReport
 from flowborne.coupling.step import step
 from flowborne.solids.trajectories import JointCommand
 from flowborne.worlds import Boundaries, BoundaryInflow, BoundaryOpen, make_world
@@ -66,9 +66,35 @@ def test_the_means_of_a_frame_add_up_to_the_impulse_that_it_gave():
     np.testing.assert_allclose(0.025 * whole, given, atol=1e-13 * abs(given[0]))
 
 
-def test_a_hypothetical_step_splits_nothing():
+def test_what_is_asked_for_in_time_is_the_same_and_later_an_error() -> None:
+    world, split = world_with(Boundaries()), world_with(Boundaries())
+    world.setup = world.setup.but(splits=False)
+    reports = [driven(world, 0.2), driven(split, 0.2)]
+    np.testing.assert_array_equal(*(report.added_mass_wrench for report in reports))
+    asked_late = driven(world, 0.3)
+    driven(world, 0.2)
+    with pytest.raises(ValueError, match="before the next"):
+        _ = asked_late.added_mass_wrench
+
+
+def test_what_is_asked_for_later_or_by_many_frames_is_the_same() -> None:
+    frames = []
+    for often in (True, False):
+        with Simulation("block-drag-max", workers=1) as simulation:
+            for n in range(3):
+                report = simulation.advance_frame()
+                assert not report.step.added_mass.done
+                if often or n == 2:
+                    row = simulation.measure()
+                assert simulation.setup.splits == (often and n > 0)
+            frames.append(row)
+    assert frames[0] == frames[1]
+
+
+def test_a_hypothetical_step_tells_motions_and_forces_alone():
     world = world_with(Boundaries())
     world.setup = world.setup.hypothetical
     report = driven(world, 0.2)
     assert np.isnan(report.added_mass_wrench).all()
+    assert np.isnan([*report.momentum_fluid, report.divergence, report.fastest]).all()
     assert np.isfinite(report.pressure_wrench).all()

@@ -35,7 +35,7 @@ class HalfPressure:
     pressure  (nx, ny, nz) of which it is made, Pa
     impulse   (k,) on the bodies, see `SolvedFlow`
     sides     (3,) impulse of the sides on the fluid, N s
-    start     (3,) momentum of the fluid without it, N s; nan in trials
+    start     (3,) momentum of the fluid without it, N s; nan without balances
     """
 
     velocity: Faces
@@ -57,8 +57,9 @@ def explicit_half_pressure(world: World, start: Departure, dt: float) -> HalfPre
     """
     fluid, state = world.flow()
     grid, sides, opened = fluid.grid, fluid.boundaries, start.cut.open
-    mass, momentum = face_masses(start.volumes, fluid.density), np.full(3, np.nan)
-    if not world.setup.trial:
+    mass = face_masses(start.volumes, fluid.density)
+    momentum = np.full(3, np.nan)
+    if world.setup.balances:
         momentum = fluid_momentum(state.velocity, mass, grid, sides)
     size = 6 * world.setup.solid.nbody + start.cut.skins.vertices.size
     if sides.gain_energy(grid) or sea_changes(world, dt) or moved_since(world):

@@ -12,6 +12,7 @@ from functools import partial
 from operator import itemgetter
 from time import perf_counter
 from typing import Annotated, Any, NamedTuple, get_type_hints
+from weakref import ref
 
 import numpy as np
 
@@ -41,6 +42,33 @@ class Outcome(Enum):
 last = itemgetter(-1)
 mean = partial(np.mean, axis=0)
 total = partial(np.sum, axis=0)
+
+
+LATE = "forces are split when asked, which is too late now: ask before the next frame or step"
+
+
+class Asked:
+    """Wrenches (nbody, 6) that are made when they are first asked for.
+
+    make  makes them; the world has it until its next step
+    kept  whether it costs nothing and is kept here
+    done  whether they have been asked for
+    """
+
+    def __init__(self, make: Callable[[], Array], kept: bool = False) -> None:
+        self._make = (lambda: make) if kept else ref(make)
+        self.done = False
+
+    def __call__(self) -> Array:
+        if not self.done:
+            if (make := self._make()) is None:
+                raise ValueError(LATE)
+            self._value, self.done = make(), True
+        return self._value
+
+
+def in_turn(parts: Sequence[Asked]) -> Asked:
+    return Asked(lambda: np.asarray(mean([part() for part in parts])), kept=True)
 
 
 def union(values: Sequence[Integers]) -> Integers:
@@ -82,8 +110,8 @@ class StepReport:
 
     Momenta and impulses are linear, (3,), N s. Errors of their exchange and of the budget are
     relative to the impulses given to bodies and faces, added up in size. The history has columns
-    of the same names, with a suffix for the unit, of all from `work` to `fastest`. In trials those
-    of the fluid's momentum, `divergence` and `fastest` are nan.
+    of the same names, with a suffix for the unit, of all from `work` to `fastest`. In trials
+    momenta, their errors, `divergence` and `fastest` are nan.
 
     dt               s
     velocity         (nv,) at the end of the step: v is that half a step before, then half a step
@@ -95,10 +123,7 @@ class StepReport:
     buoyancy_wrench  (nbody, 6) the same of the hydrostatic pressure (Archimedes)
     wind_wrench      (nbody, 6) the same of the simple winds
     jet_wrench       (nbody, 6) the same of the reaction of what mouths expel
-    added_mass_wrench
-                     (nbody, 6) part of `pressure_wrench` with which the fluid resists the change of
-                     the bodies' velocities (see `solve.added_mass_impulse`); nan where the setup
-                     does not split forces, as in trials
+    added_mass       of which `added_mass_wrench` is made
     centre           (nbody, 3) centres of mass at the end of the step, m; 0 where neither a fluid
                      nor a wind acts
     work             of the drives, J
@@ -146,7 +171,7 @@ class StepReport:
     buoyancy_wrench: Mean
     wind_wrench: Mean
     jet_wrench: Mean
-    added_mass_wrench: Mean
+    added_mass: Annotated[Asked, Joined(in_turn)]
     centre: Mean
     work: Annotated[float, Joined(sum, sum, "J")] = 0.0
     momentum_solid: Momentum = field(default_factory=no_momentum)
@@ -170,6 +195,13 @@ class StepReport:
     limited: Annotated[Integers, Joined(union)] = field(default_factory=no_dofs)
     unsettled: Annotated[Integers, Joined(last)] = field(default_factory=no_dofs)
 
+    @property
+    def added_mass_wrench(self) -> Array:
+        """(nbody, 6) part of `pressure_wrench` with which the fluid resists the change of the
+        bodies' velocities (see `solve.added_mass_impulse`); nan in trials. It is solved for at the
+        first call. Raises ValueError after the next step."""
+        return self.added_mass()
+
     def fluid_wrench(self) -> Array:
         """(nbody, 6) everything that the fluid and the winds do to each body."""
         stresses = self.pressure_wrench + self.viscous_wrench + self.buoyancy_wrench
@@ -186,7 +218,7 @@ class StepReport:
     def sensed(self, world: World) -> Sensed:
         """What can be sensed of the bodies and joints of `world` after the step."""
         state = self.velocity, self.acceleration, self.dt, self.actuator
-        wrenches = self.central_wrench(), self.central_added_mass()
+        wrenches = self.central_wrench(), self.central_added_mass
         return Sensed(world.setup.solid, world.solid.q, *state, *wrenches)
 
 

@@ -18,7 +18,9 @@ Method: docs/method/coupled-solve.md.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -86,8 +88,8 @@ class SolvedFlow(Solved):
     forces on vertices of flesh, N s and N m s.
 
     viscous_impulse  (k,)
-    added_mass       (k,) part of `impulse`, see `added_mass_impulse`; nan where the setup does not
-                     split forces
+    added_mass       (k,) the part of `impulse` of `added_mass_impulse`, or what gives it; nan in
+                     trials
     before_pressure  Faces, m/s
     velocity         Faces u+, m/s
     pressure         (nx, ny, nz) p, Pa
@@ -95,12 +97,12 @@ class SolvedFlow(Solved):
     sides            (3,) impulse of the sides on the fluid, N s
     iterations       of the pressure solve, all turns of a step together
     residual         true relative residual
-    divergence       largest |net outflow of a cell| / volume, 1/s; nan in trials
-    fastest          largest |u+| on an open face, m/s; nan in trials
+    divergence       largest |net outflow of a cell| / volume, 1/s; nan without balances
+    fastest          largest |u+| on an open face, m/s; likewise
     """
 
     viscous_impulse: Array
-    added_mass: Array
+    added_mass: Array | Callable[[], Array]
     before_pressure: Faces
     velocity: Faces
     pressure: Array
@@ -219,16 +221,17 @@ def solve_together(
     if not solution.converged:
         outcome = Outcome.PRESSURE_NOT_CONVERGED
     change = boundary_velocity(pose, v - driven.system.v)
-    added, divergence, fastest = np.full(change.size, np.nan), np.nan, np.nan
-    if not world.setup.trial:
+    plain = partial(PressureSystem, weights, fluid.boundaries.periodic(), beyond=beyond)
+    added_mass: Array | Callable[[], Array] = partial(added_mass_impulse, plain, cut, change)
+    divergence = fastest = np.nan
+    if world.setup.balances:
         moved = start + term.mobility.times(on_solids)
         divergence = largest_divergence(after, cut, moved, rate, fluid)
         fastest = max(largest_open(after[axis], cut.open[axis]) for axis in fluid.grid.axes)
+    else:
+        added_mass = np.full(change.size, np.nan)
     if world.setup.splits:
-        plain = matrix
-        if yielding.size:
-            plain = PressureSystem(weights, fluid.boundaries.periodic(), beyond=beyond)
-        added = added_mass_impulse(plain, cut, change)
+        added_mass = added_mass_impulse(plain if yielding.size else lambda: matrix, cut, change)
     return SolvedFlow(
         driven,
         v,
@@ -236,7 +239,7 @@ def solve_together(
         outcome,
         left,
         viscous_impulse=viscous,
-        added_mass=added,
+        added_mass=added_mass,
         before_pressure=smooth,
         velocity=after,
         pressure=solution.pressure / dt,
@@ -249,7 +252,7 @@ def solve_together(
     )
 
 
-def added_mass_impulse(matrix: PressureSystem, cut: Geometry, change: Array) -> Array:
+def added_mass_impulse(matrix: Callable[[], PressureSystem], cut: Geometry, change: Array) -> Array:
     """(k,) impulse of the fluid on bodies whose motion (k,) changes by `change` in a step.
 
         -J^T K^-1 J (v+ - v)
@@ -257,13 +260,14 @@ def added_mass_impulse(matrix: PressureSystem, cut: Geometry, change: Array) -> 
     The pressure's impulse less this one is what it would give bodies that kept their velocities:
     with them fixed, K p^ = -(D u* + J v+), which is linear in v+.
 
-    matrix  K, with a preconditioner of its own: what flesh makes room for is no part of it
+    matrix  gives K, with a preconditioner of its own: what flesh makes room for is no part of it
     """
-    rhs = np.zeros(matrix.shape)
+    system = matrix()
+    rhs = np.zeros(system.shape)
     add_flux(rhs, cut, -change)
     if not rhs.any():
         return np.zeros(change.size)
-    solution = matrix.solve(rhs, None, NO_TERM, SPLIT_TOLERANCE)
+    solution = system.solve(rhs, None, NO_TERM, SPLIT_TOLERANCE)
     return pressure_push(cut, solution.pressure, change.size)
 
 

@@ -80,6 +80,7 @@ def step(world: World, dt: float, command: JointCommand | None = None) -> StepRe
             world.parts = parts = max(parts, world.parts)
         command = JointCommand.none(world.setup.solid.nv) if command is None else command
         reports: list[StepReport] = []
+        world.splitting = ()
         for left in range(parts, 0, -1):
             reports.append(step_part(world, dt / parts, part_of(command, world, left)))
             if reports[-1].outcome is not Outcome.DONE:

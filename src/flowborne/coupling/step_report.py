@@ -12,7 +12,7 @@ from flowborne.coupling.flow import AdvectionResult
 from flowborne.coupling.half_pressure import HalfPressure
 from flowborne.coupling.mouths import Jet, jet_wrench
 from flowborne.coupling.operators import buoyancy_wrench
-from flowborne.coupling.report import FIELDS, Outcome, StepReport
+from flowborne.coupling.report import FIELDS, Asked, Outcome, StepReport
 from flowborne.coupling.solve import Solved, SolvedFlow
 from flowborne.coupling.stream import winds_on
 from flowborne.coupling.world import World
@@ -24,18 +24,19 @@ from flowborne.solids.model import SolidModel
 from flowborne.solids.momentum import halfway_momentum
 
 WRENCHES = [name for name in FIELDS if name.endswith("_wrench")]
-BUDGET = {
-    name: np.nan if name.endswith("_error") else np.full(3, np.nan)
-    for name in FIELDS
-    if name.startswith("momentum_") and name != "momentum_solid"
+UNKNOWN = {
+    name: np.full(3, np.nan) if made.axes else np.nan
+    for name, made in FIELDS.items()
+    if name.startswith("momentum_")
 }
-"""What the report of a trial says of the fluid's momentum."""
+"""What reports say of momenta without balances."""
 
 
 def fluid_forces(model: SolidModel, value: float) -> dict[str, Any]:
     """What a report says of forces on bodies where all are `value`: 0, or nan if not known."""
     wrench = np.full((model.nbody, 6), value)
-    return dict.fromkeys(WRENCHES, wrench) | {"centre": wrench[:, :3]}
+    around = {"centre": wrench[:, :3], "added_mass": Asked(lambda: wrench, kept=True)}
+    return dict.fromkeys(WRENCHES, wrench) | around
 
 
 def report_failed(model: SolidModel, dt: float, outcome: Outcome) -> StepReport:
@@ -52,6 +53,9 @@ def report_bodies(world: World, dt: float, solved: Solved, known: dict[str, Any]
     before, model = solved.driven.system.v, world.setup.solid
     velocity = 0.5 * (before + solved.v)
     actuator = solved.actuator + world.told.force_on(model.nv)
+    balance = UNKNOWN
+    if world.setup.balances:
+        balance = {"momentum_solid": halfway_momentum(model, world.solid, dt)[0]}
     return StepReport(
         dt,
         solved.outcome if np.isfinite(solved.v).all() else Outcome.NOT_FINITE,
@@ -59,11 +63,10 @@ def report_bodies(world: World, dt: float, solved: Solved, known: dict[str, Any]
         (solved.v - before) / dt,
         actuator,
         work=dt * float(actuator @ velocity),
-        momentum_solid=halfway_momentum(model, world.solid, dt)[0],
         contacts=solved.driven.system.contacts,
         limited=solved.driven.limited.nonzero()[0],
         unsettled=solved.unsettled,
-        **fluid_forces(model, 0.0) | known,
+        **fluid_forces(model, 0.0) | balance | known,
     )
 
 
@@ -105,13 +108,19 @@ def report_coupled(
     mass   Faces, of the fluid at the end of the step, kg
     known  what the report says of forces known before the solve, and of dyes
     """
-    flesh = world.setup.solid.flesh
-    known |= BUDGET if world.setup.trial else momentum_budget(world, mass, half, advected, solved)
+    flesh, added = world.setup.solid.flesh, solved.added_mass
+
+    def added_mass() -> Array:
+        return on_bodies(pose, flesh, (added() if callable(added) else added) / dt)
+
+    world.splitting = (*world.splitting, added_mass)
+    if world.setup.balances:
+        known |= momentum_budget(world, mass, half, advected, solved)
     known |= {
         "centre": pose.mass_centre,
         "pressure_wrench": on_bodies(pose, flesh, (solved.impulse + half.impulse) / dt),
         "viscous_wrench": on_bodies(pose, flesh, solved.viscous_impulse / dt),
-        "added_mass_wrench": on_bodies(pose, flesh, solved.added_mass / dt),
+        "added_mass": Asked(added_mass, kept=not callable(added)),
         "solver_iterations": solved.iterations,
         "residual": solved.residual,
         "divergence": solved.divergence,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -75,7 +76,10 @@ class Setup:
     winds    simple winds (paper eq. 2, or a uniform force)
     mouths   patches of skin through which fluid is expelled; needs a fluid that is not one-way
     trial    whether steps are hypothetical, and may be longer than those of the world itself
-    splits   whether steps report the added-mass part of the fluid's force, which costs a solve
+    balances whether steps report momenta, divergence, the fastest flow and the added-mass part of
+             forces; else they are nan, as in trials
+    splits   whether the added-mass part of the fluid's force, which costs a solve, is split off in
+             each step; else when its report is asked for it, and the matrix is then made again
     basis    a setup of the same bodies on the same grid, whose shapes are those of this one
     """
 
@@ -85,6 +89,7 @@ class Setup:
     winds: tuple[Wind, ...] = ()
     mouths: tuple[Mouth, ...] = ()
     trial: bool = False
+    balances: bool = True
     splits: bool = False
     basis: Setup | None = None
 
@@ -94,7 +99,7 @@ class Setup:
         fluid = self.fluid
         if fluid is not None:
             fluid = replace(fluid, tolerance=max(fluid.tolerance, TRIAL_TOLERANCE))
-        return self.but(fluid=fluid, trial=True, splits=False)
+        return self.but(fluid=fluid, trial=True, balances=False, splits=False)
 
     @property
     def rehearsed(self) -> Setup:
@@ -141,6 +146,8 @@ class World:
     volumes the cut that the last step ended with, and its control volumes; likewise
     still   the cut that did not change in the last step, and the gradient and the matrix of its
             leak-proof projection, which a copy makes anew; likewise
+    splitting
+            make the added-mass part of forces, for each part of the last step; likewise
     """
 
     setup: Setup
@@ -157,9 +164,10 @@ class World:
     still: tuple[Geometry, PressureGradient, PressureSystem] | None = field(
         default=None, repr=False, compare=False
     )
+    splitting: tuple[Callable[[], Array], ...] = field(default=(), repr=False, compare=False)
 
     def __getstate__(self) -> dict[str, object]:
-        return vars(self) | {"cut": None, "volumes": None, "still": None}
+        return vars(self) | {"cut": None, "volumes": None, "still": None, "splitting": ()}
 
     @classmethod
     def at_rest(cls, setup: Setup) -> World:

@@ -323,18 +323,8 @@ def columns_to_diagonal(weights: Triple, added: Real, periodic: Periodic) -> Non
 def coarsen(hierarchy: Hierarchy) -> None:
     """Fill all levels from the weights of the finest, from what is added to its diagonal, and from
     which of its rows are even."""
-    (
-        table,
-        periodic,
-        weights,
-        reaction,
-        inverse,
-        even,
-        interpolation,
-        marks,
-        orphans,
-        aggregates,
-    ) = hierarchy
+    table, periodic, weights, reaction, inverse, even, interpolation = hierarchy[:7]
+    marks, orphans, aggregates = hierarchy[7:]
     reacts = has_any(at_level(reaction, table, 0))
     for level in range(table.shape[0] - 1):
         w, share = weights_at(weights, table, level), at_level(inverse, table, level)

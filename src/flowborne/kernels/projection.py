@@ -21,14 +21,9 @@ def net_out(out: Array, qx: Array, qy: Array, qz: Array) -> None:
     for i in prange(out.shape[0]):
         for j in range(out.shape[1]):
             for k in range(out.shape[2]):
-                out[i, j, k] = (
-                    qx[i + deep, j, k]
-                    - qx[i, j, k]
-                    + qy[i, j + 1, k]
-                    - qy[i, j, k]
-                    + qz[i, j, k + 1]
-                    - qz[i, j, k]
-                )
+                total = qx[i + deep, j, k] - qx[i, j, k]
+                total = total + qy[i, j + 1, k] - qy[i, j, k]
+                out[i, j, k] = total + qz[i, j, k + 1] - qz[i, j, k]
 
 
 @inlined

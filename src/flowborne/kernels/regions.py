@@ -100,27 +100,17 @@ def label_regions(
                 if d and w0[i, j, k] > 0.0 and i > 1 and label[i - 1, j, k] != last0:
                     last0 = label[i - 1, j, k]
                     join(parent, run, last0)
-    if d:
-        for j in range(1, p1 - 1):
-            for k in range(1, p2 - 1):
-                for end in range(2):
-                    w = w0[1, j, k] if end == 0 else w0[p0 - 1, j, k]
-                    if w > 0.0:
-                        other = label[p0 - 2, j, k] if periodic[0] else 0
-                        join(parent, label[1 if end == 0 else p0 - 2, j, k], other)
-    for i in range(d, p0 - d):
-        for k in range(1, p2 - 1):
-            for end in range(2):
-                w = w1[i, 1, k] if end == 0 else w1[i, p1 - 1, k]
-                if w > 0.0:
-                    other = label[i, p1 - 2, k] if periodic[1] else 0
-                    join(parent, label[i, 1 if end == 0 else p1 - 2, k], other)
-        for j in range(1, p1 - 1):
-            for end in range(2):
-                w = w2[i, j, 1] if end == 0 else w2[i, j, p2 - 1]
-                if w > 0.0:
-                    other = label[i, j, p2 - 2] if periodic[2] else 0
-                    join(parent, label[i, j, 1 if end == 0 else p2 - 2], other)
+    cells, shape, stride = label.reshape(-1), (p0, p1, p2), (p1 * p2, p2, 1)
+    for axis in range(1 - d, 3):
+        n, step, w = shape[axis] - 2, stride[axis], finest[axis].reshape(-1)
+        one, other = int(axis == 0), 2 - int(axis == 2)
+        for a in range(shape[one]):
+            for b in range(shape[other]):
+                at = a * stride[one] + b * stride[other]
+                for own, face, beyond in ((1, 1, n), (n, n + 1, 1)):
+                    if w[at + face * step] > 0.0:
+                        joined = cells[at + beyond * step] if periodic[axis] else 0
+                        join(parent, cells[at + own * step], joined)
     regions = 0
     for a in range(1, used):
         top = parent[a]

@@ -61,7 +61,7 @@ class Moment:
 
     def without_cut(self) -> Moment:
         """The same without what can be made of the state again: cuts of the grid are large."""
-        world = replace(self.snapshot.world, cut=None, volumes=None)
+        world = replace(self.snapshot.world, cut=None, volumes=None, splitting=())
         return replace(self, snapshot=replace(self.snapshot, world=world))
 
 

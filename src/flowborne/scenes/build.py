@@ -90,7 +90,7 @@ def build(scene: Scene, executor: Mapper | None = None) -> Built:
     start = initial_state(scene, model)
     winds, controller = _acting(scene, model, executor or Serial())
     fluid = with_window(fluid_of(scene), scene, model, start.q)
-    setup = Setup(model, fluid, motions, winds, mouths_of(scene, model), splits=True)
+    setup = Setup(model, fluid, motions, winds, mouths_of(scene, model))
     world = World.at_rest(setup)
     world.solid = start
     if world.fluid is not None and scene.fluid is not None:

@@ -12,7 +12,7 @@ import numpy as np
 
 from flowborne.base.errors import SceneError
 from flowborne.control.objectives import name_of
-from flowborne.coupling.report import FIELDS, StepReport
+from flowborne.coupling.report import FIELDS
 from flowborne.coupling.world import Setup
 from flowborne.kernels.arrays import Array, Integers, Mask
 from flowborne.runs.history import OF_BODIES, POSE, body_columns, joint_column
@@ -40,11 +40,13 @@ class Quantity:
     names    in the order in which they are written
     values   their numbers, in this order, from a FrameReport
     of_step  False where they are known without a frame: their numbers are from a Snapshot
+    splits   whether they ask for the added-mass part of forces, which costs a solve
     """
 
     names: Sequence[str]
     values: Callable[[Any], Iterable[float]]
     of_step: bool = True
+    splits: bool = False
 
 
 class Columns:
@@ -114,10 +116,15 @@ class Columns:
                 "model."
             )
 
-    def values(self, now: Snapshot) -> dict[str, float]:
-        """column -> number, in the order of `names`; without a report nan for what needs a step."""
+    def values(self, now: Snapshot, split: bool = True) -> dict[str, float]:
+        """column -> number, in the order of `names`; without a report nan for what needs a step.
+
+        split  whether with those that ask for the added-mass part of forces
+        """
         found: dict[str, float] = {}
         for quantity in self._quantities:
+            if quantity.splits and not split:
+                continue
             source = now.report if quantity.of_step else now
             if source is None:
                 found |= dict.fromkeys(quantity.names, np.nan)
@@ -221,14 +228,15 @@ def of_forces(stream: tuple[float, ...] | None, controlled: Integers) -> Iterato
     along, across = axes_of(stream)
 
     def forces(frame: FrameReport) -> list[float]:
-        added = frame.mean(StepReport.central_added_mass)[1:, :3].sum(axis=0)
+        added = frame.central_added_mass()[1:, :3].sum(axis=0)
         both = frame.drag()[1:].sum(axis=0), added
         return [float(force @ axis) for force in both for axis in (along, across)]
 
     def effort(frame: FrameReport) -> list[float]:
         return [float(np.linalg.norm(frame.step.actuator[controlled]) * frame.step.dt)]
 
-    yield Quantity(["drag_N", "lift_N", "added_mass_drag_N", "added_mass_lift_N"], forces)
+    names = ["drag_N", "lift_N", "added_mass_drag_N", "added_mass_lift_N"]
+    yield Quantity(names, forces, splits=True)
     yield Quantity(["effort"], effort)
     yield of_steps("work")
 
@@ -254,7 +262,7 @@ def of_bodies(model: SolidModel, named: tuple[str, ...]) -> Iterator[Quantity]:
 
     yield Quantity([f"{name}_{column}" for name in names for column in POSE], poses, False)
     for name in named:
-        yield Quantity(body_columns(name), partial(numbers_of, name), False)
+        yield Quantity(body_columns(name), partial(numbers_of, name), False, splits=True)
 
 
 def of_fluid(setup: Setup) -> Iterator[Quantity]:

@@ -67,13 +67,18 @@ class FrameReport:
         return replace(
             self.step.sensed(world),
             wrench=self.mean(StepReport.central_wrench),
-            added_mass=self.mean(StepReport.central_added_mass),
+            added_mass=self.central_added_mass,
         )
 
+    def central_added_mass(self) -> Array:
+        """(nbody, 6) mean of the part of the wrenches that resists the bodies' acceleration. Raises
+        ValueError when the first call is after the next frame."""
+        return self.mean(StepReport.central_added_mass)
+
     def drag(self) -> Array:
-        """(nbody, 3) mean force of fluid and winds on bodies that keep their velocities, N."""
-        added_mass = self.mean(StepReport.central_added_mass)
-        return (self.mean(StepReport.central_wrench) - added_mass)[:, :3]
+        """(nbody, 3) mean force of fluid and winds on bodies that keep their velocities, N; see
+        `central_added_mass`."""
+        return (self.mean(StepReport.central_wrench) - self.central_added_mass())[:, :3]
 
 
 @dataclass(frozen=True, eq=False)

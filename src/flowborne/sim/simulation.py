@@ -196,6 +196,9 @@ class Simulation:
         """
         self._apply_changes()
         world = self.world.copy()
+        splits = self.report is not None and self.report.step.added_mass.done
+        if splits != world.setup.splits:  # asked for once, asked for again
+            world.setup = world.setup.but(splits=splits)
         if commands is None and self._policy is not None:
             try:
                 commands = self._policy(self)
@@ -208,7 +211,7 @@ class Simulation:
             report = self._advance(world, self.frame + 1, beyond)
         world.told = NOTHING_TOLD
         moment = Snapshot(world, report.frame, report)
-        lost = self.columns.lost(self.columns.values(moment))
+        lost = self.columns.lost(self.columns.values(moment, split=False))
         if lost:
             raise BlowUpError(report.frame, self.steps_per_frame, f"{lost} is not a finite number")
         self._moment = moment
@@ -271,7 +274,8 @@ class Simulation:
 
         Values that only a step can give are nan before the first frame.
         """
-        return self.columns.values(self.snapshot())
+        with _one_blas_thread(), kernel_threads(_threads(self.setup)):
+            return self.columns.values(self.snapshot())
 
     def close(self) -> None:
         """Stop the controller's workers."""
@@ -320,6 +324,7 @@ class Simulation:
         gradient, targets, objective, decided = nothing, nothing, np.nan, False
         terms: dict[str, float] = {}
         reports = []
+        splitting: tuple[Callable[[], Array], ...] = ()
         number = 1
         try:
             if controller is not None:
@@ -330,6 +335,7 @@ class Simulation:
             for number in range(1, self.steps_per_frame + 1):
                 command = None if controller is None else controller.command(world, end, dt)
                 reports.append(self._step(world, dt, command))
+                splitting += world.splitting
                 cause = trouble(world, reports[-1])
                 if cause:
                     raise BlowUpError(frame, number, cause)
@@ -342,6 +348,7 @@ class Simulation:
         except MemoryError as error:
             cause = f"the memory is full ({error})" if str(error) else "the memory is full"
             raise BlowUpError(frame, number, cause) from error
+        world.splitting = splitting
         for report in reports:
             for part, spent in report.seconds.items():
                 seconds[part] = seconds.get(part, 0.0) + spent

@@ -7,7 +7,8 @@ is the mean of both. Read half a step off, a force in phase with an acceleration
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -32,9 +33,8 @@ class BodyState:
                       (3,) rad/s^2
     force             (3,) of fluid and winds, N (N/m in a slab)
     torque            (3,) of the same about its centre of mass, N m
-    added_mass_force  (3,) the part of `force` with which the fluid resists acceleration.
-                      The rest acts on bodies that keep their velocities. nan in trials
-    added_mass_torque (3,) the same part of `torque`
+    added_mass        gives (6,) the part of force and torque with which the fluid resists
+                      acceleration, solved for when it is first asked for
     """
 
     position: Array
@@ -46,8 +46,18 @@ class BodyState:
     angular_acceleration: Array
     force: Array
     torque: Array
-    added_mass_force: Array
-    added_mass_torque: Array
+    added_mass: Callable[[], Array] = field(repr=False, kw_only=True)
+
+    @property
+    def added_mass_force(self) -> Array:
+        """(3,) the part of `force` with which the fluid resists acceleration, N. The rest acts on
+        bodies that keep their velocities. nan in trials."""
+        return self.added_mass()[:3]
+
+    @property
+    def added_mass_torque(self) -> Array:
+        """(3,) the same part of `torque`, N m."""
+        return self.added_mass()[3:]
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +85,7 @@ class Sensed:
     dt            s, length of that step
     actuator      (nv,) generalised force of the drives in that step, N or N m
     wrench        (nbody, 6) of fluid and winds, about the bodies' centres of mass
-    added_mass    (nbody, 6) the part of it that resists the bodies' acceleration
+    added_mass    gives (nbody, 6) the part of it that resists the bodies' acceleration
     """
 
     model: SolidModel
@@ -85,33 +95,37 @@ class Sensed:
     dt: float
     actuator: Array
     wrench: Array
-    added_mass: Array
+    added_mass: Callable[[], Array]
 
     @classmethod
     def before_steps(cls, model: SolidModel, q: Array) -> Sensed:
         """Of the start, where only positions are known."""
         drives, wrench = np.full(model.nv, np.nan), np.full((model.nbody, 6), np.nan)
-        return cls(model, q, drives, drives, np.nan, drives, wrench, wrench)
+        return cls(model, q, drives, drives, np.nan, drives, wrench, lambda: wrench)
 
     def arrays(self) -> dict[str, Array]:
         """What a step told, as named arrays; none before the first."""
+        if np.isnan(self.dt):
+            return {}
         named = {name: np.asarray(getattr(self, name)) for name in OF_STEP}
-        return {} if np.isnan(self.dt) else named
+        return named | {"added_mass": self.added_mass()}
 
     @classmethod
     def from_arrays(cls, model: SolidModel, q: Array, arrays: dict[str, Array]) -> Sensed:
         """The way back."""
-        told = {name: arrays[name] for name in OF_STEP}
-        return cls(model, q, **told | {"dt": float(arrays["dt"])})  # type: ignore[arg-type]
+        told = {name: arrays[name] for name in OF_STEP} | {"dt": float(arrays["dt"])}
+        added = arrays["added_mass"]
+        return cls(model, q, **told, added_mass=lambda: added)  # type: ignore[arg-type]
 
     def body(self, name: str) -> BodyState:
         """A body's state. Raises ValueError for an unknown name."""
         pose, body = self.pose, self.model.body(name)
         velocity = central_twist(pose, self.velocity, body)
         before, after = (central_twist(*half, body) for half in self._halves)
-        sixes = velocity, (after - before) / self.dt, self.wrench[body], self.added_mass[body]
+        sixes = velocity, (after - before) / self.dt, self.wrench[body]
         place = pose.body_position[body], pose.body_rotation[body], pose.mass_centre[body]
-        return BodyState(*place, *(half for six in sixes for half in np.split(six, 2)))
+        halves = (half for six in sixes for half in np.split(six, 2))
+        return BodyState(*place, *halves, added_mass=lambda: self.added_mass()[body])
 
     def joint(self, name: str) -> JointState:
         """A joint's state. Raises ValueError for an unknown name."""
@@ -134,8 +148,8 @@ class Sensed:
         return (kinematics(self.model, first), before), (kinematics(self.model, last), after)
 
 
-OF_STEP = ("velocity", "acceleration", "dt", "actuator", "wrench", "added_mass")
-"""What a step tells, in the order of a checkpoint."""
+OF_STEP = ("velocity", "acceleration", "dt", "actuator", "wrench")
+"""What a step tells besides the added mass, in the order of a checkpoint."""
 
 
 def central_twist(pose: Kinematics, velocity: Array, body: int) -> Array:

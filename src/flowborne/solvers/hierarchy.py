@@ -80,26 +80,13 @@ class Buffers:
         self.marks: Marks = np.full(total, OWN, np.uint8)
         self.orphans: Indices = np.zeros(total, np.int32)
         self.aggregates: Indices = np.zeros(total, np.int32)
+        of_faces = self.weights, self.reaction, self.inverse, self.even, self.interpolation
+        of_cells = self.marks, self.orphans, self.aggregates
+        self.hierarchy: Hierarchy = (self.table, self.periodic, *of_faces, *of_cells)
         self.cycle = packed(total), packed(total), packed(total)
         self.label: Labels = np.zeros(padded, np.int32)
         self.parent: Labels = np.zeros(self.label.size + 1, np.int32)
         self.count: Labels = np.zeros(self.label.size + 1, np.int32)
-
-    @property
-    def hierarchy(self) -> Hierarchy:
-        """The arrays of all levels."""
-        return (
-            self.table,
-            self.periodic,
-            self.weights,
-            self.reaction,
-            self.inverse,
-            self.even,
-            self.interpolation,
-            self.marks,
-            self.orphans,
-            self.aggregates,
-        )
 
     def prepare(
         self, faces: tuple[Array, Array, Array], reaction: Array

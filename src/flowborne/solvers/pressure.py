@@ -131,7 +131,8 @@ class PressureSystem:
                 "Turn it so that its thin axis is z."
             )
         self.slab = nz == 1
-        inner = (1, nx, ny) if self.slab else self.shape
+        self.inner = inner = (1, nx, ny) if self.slab else self.shape
+        self.inside = slice(None) if self.slab else slice(1, -1), slice(1, -1), slice(1, -1)
         wraps = (False, periodic[0], periodic[1]) if self.slab else periodic
         x, y, z = (np.ascontiguousarray(w, np.float64) for w in weights)
         faces = (x, y, z)
@@ -156,9 +157,7 @@ class PressureSystem:
         """
         if not term.mobility.yields:
             term = NO_TERM
-        b = self.buffers
-        inner = b.label.shape
-        cells = (inner[0] - 2 if inner[0] > 1 else 1, inner[1] - 2, inner[2] - 2)
+        b, cells = self.buffers, self.inner
         diagonal = b.finest[3]
         x, right = b.vectors[:2]
         if guess is None:
@@ -173,16 +172,12 @@ class PressureSystem:
         iterations, residual, converged = solve(
             matrix, cycle, b.vectors, tolerance, absolute, guessed
         )
-        start = (1 if inner[0] > 1 else 0, 1, 1)
-        inside = tuple(slice(s, s + n) for s, n in zip(start, cells, strict=True))
-        pressure = x[inside].copy().reshape(self.shape)
+        pressure = x[self.inside].copy().reshape(self.shape)
         return PressureSolution(pressure, int(iterations), float(residual), bool(converged))
 
     def closed_regions(self) -> Indices:
         """(nx, ny, nz) number of the region without an open side of each cell, -1 in all others."""
-        label = self.buffers.label
-        inner = label[(slice(None) if self.slab else slice(1, -1), slice(1, -1), slice(1, -1))]
-        return inner.reshape(self.shape)
+        return self.buffers.label[self.inside].reshape(self.shape)
 
     def _with_term(self, term: LowRankTerm) -> tuple[Matrix, Preconditioner]:
         """The matrix with the term, the same for every right-hand side, and what deflates it."""
