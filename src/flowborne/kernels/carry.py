@@ -25,6 +25,7 @@ from flowborne.kernels.control_volumes import (
     stride,
 )
 from flowborne.kernels.face_masses import add_transfers, give, place_of
+from flowborne.kernels.faces import flat
 from flowborne.kernels.flux import (
     CLEAR,
     CUT,
@@ -112,7 +113,7 @@ class Scratch(NamedTuple):
     and like the velocity; `nought` is 0 before and after."""
 
     padded: Padded
-    net: Array
+    kept: Array
     start: Array
     middle: Array
     early: Array
@@ -374,11 +375,10 @@ def join(u: Array, axis: int) -> None:
 @kernel
 def part_of_step(out: Array, start: Array, end: Array, part: float) -> None:
     """start + part (end - start)."""
-    one, other, both = start.reshape(-1), end.reshape(-1), out.reshape(-1)
-    size = one.size // start.shape[0]
-    for i in prange(start.shape[0]):
-        for n in range(i * size, (i + 1) * size):
-            both[n] = one[n] + part * (other[n] - one[n])
+    one, other, both = flat(start), flat(end), flat(out)
+    for i in prange(one.shape[0]):
+        for n in range(one.shape[1]):
+            both[i, n] = one[i, n] + part * (other[i, n] - one[i, n])
 
 
 @njit(nogil=True, cache=True)
@@ -464,7 +464,7 @@ def carry(
         for turn in range(2):
             weight = 1.0 - 0.5 * turn
             source, target = (start, middle) if turn == 0 else (middle, later)
-            now = Stage(target, scratch.net, high, weight, dt, volumes.nothing)
+            now = Stage(target, scratch.kept, high, weight, dt, volumes.nothing)
             if rising > 0.0 and s + turn > 0:
                 pad_field(padded.values, source, along, rising * (s + turn) * dt)
             else:
