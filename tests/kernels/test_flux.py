@@ -41,11 +41,11 @@ def fluxes(cells: Shape, random: np.random.Generator) -> tuple[np.ndarray, ...]:
 def net_of(field: np.ndarray, marks: np.ndarray, q: tuple, component: int) -> np.ndarray:
     """What leaves each control volume per time."""
     shape = face_shape((q[1].shape[0], q[0].shape[1], q[0].shape[2]), component)
-    nothing, net = np.zeros(shape), np.full(shape, np.nan)
+    nothing, kept = np.zeros(shape), np.full(shape, np.nan)
     flux = Fluxes(q, component, *neighbours(shape[component], periodic=False))
-    now = Stage(np.empty(shape), net, nothing, 1.0, 1.0, 1e-9)
+    now = Stage(np.empty(shape), kept, nothing, 1.0, 2.0, 1e-9)
     stage(now, nothing, nothing, Padded(field, marks), flux)
-    return net
+    return -kept
 
 
 @COMPONENTS
@@ -59,19 +59,18 @@ def test_stage(
     random, shape = np.random.default_rng(1), face_shape(cells, component)
     field = random.standard_normal(padded(shape))
     marks = random.choice(np.array(marked, np.uint8), padded(shape))
-    start, before, after, net = random.standard_normal((4, *shape))
+    start, before, after, kept = random.standard_normal((4, *shape))
     after[after < 0.3] = 0.0
     flux = Fluxes(fluxes(cells, random), component, *neighbours(shape[component], periodic))
     rest = start, before, Padded(field, marks), flux
     out = np.full(shape, np.nan)
-    now = Stage(out, net, after, weight, 0.3, 1e-9)
-    value, total = stage_reference(now, *rest)
+    now = Stage(out, kept, after, weight, 0.3, 1e-9)
+    value, left = stage_reference(now, *rest)
     stage(now, *rest)
-    if weight == 1.0:
-        np.testing.assert_allclose(net, total, atol=1e-13)
+    np.testing.assert_allclose(kept, left, atol=1e-13)
     np.testing.assert_allclose(out, value, rtol=1e-12, atol=1e-12)
     again = np.full(shape, np.nan)
-    stage.parallel(now._replace(later=again, net=net if weight < 1.0 else total), *rest)
+    stage.parallel(now._replace(later=again), *rest)
     np.testing.assert_array_equal(again, out)
 
 

@@ -122,7 +122,7 @@ class Scratch(NamedTuple):
     and like the velocity; `nought` is 0 before and after."""
 
     padded: Padded
-    net: Array
+    kept: Array
     start: Array
     middle: Array
     early: Array
@@ -465,7 +465,7 @@ def carry(
         for turn in range(2):
             weight = 1.0 - 0.5 * turn
             source, target = (start, middle) if turn == 0 else (middle, later)
-            now = Stage(target, scratch.net, high, weight, dt, volumes.nothing)
+            now = Stage(target, scratch.kept, high, weight, dt, volumes.nothing)
             if rising > 0.0 and s + turn > 0:
                 pad_field(padded.values, source, along, rising * (s + turn) * dt)
             else:

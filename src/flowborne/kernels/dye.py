@@ -113,50 +113,68 @@ def sweep(
     strips = (count + WIDTH - 1) // WIDTH
     for block in prange(m * strips):
         i, start = np.int64(block) // strips, (np.int64(block) % strips) * WIDTH
-        w = min(WIDTH, count - start)
-        c, v, free = np.empty((n + 4, w)), np.empty((n + 2, w)), np.zeros((n + 2, w))
+        w, strip = min(WIDTH, count - start), slice(start, start + WIDTH)
+        lines, room, through = field[i, :, strip], volume[i, :, strip], flux[i, :, strip]
+        marks, c = clear[i, :, strip], np.empty((n + 4, w))
+        v, free = np.ones((n + 2, w)), np.empty(w)
         for j in range(n):
+            line, row = lines[j], c[j + 2]
             for k in range(w):
-                c[j + 2, k] = field[i, j, start + k]
-                v[j + 1, k] = volume[i, j, start + k]
-                free[j + 1, k] = clear[i, j, start + k]
-        for k in range(w):
-            c[:2, k] = ends[0, i, start + k]
-            c[n + 2 :, k] = ends[1, i, start + k]
-            if wraps:
-                c[0, k], c[1, k] = c[n, k], c[n + 1, k]
-                c[n + 2, k], c[n + 3, k] = c[2, k], c[3, k]
-            v[0, k], v[n + 1, k] = v[n, k], v[1, k]
+                row[k] = line[k]
+        for j in range(2):
+            c[j] = c[n + j] if wraps else ends[0, i, strip]
+            c[n + 2 + j] = c[2 + j] if wraps else ends[1, i, strip]
         low, high, even = np.zeros((n + 2, w)), np.zeros((n + 2, w)), 0
+        steady = np.ones(n + 2, np.bool_)  # nothing but the volume changes between two such rows
         for j in range(n + 4):
             row, before, same = c[j], c[max(j - 1, 0), 0], True
             for k in range(w):
                 same &= row[k] == before
-            even = even + 1 if same else 0
+            even, at = even + 1 if same else 0, j - 3
             if j >= 4 and even < 5:  # in the middle of five equal rows parabolas are flat
-                n0, n1, n2, n3, at = c[j - 4], c[j - 3], c[j - 2], c[j - 1], j - 3
-                bend_row(low[at], high[at], n0, n1, n2, n3, row, free[at], least, most)
+                n0, n1, n2, n3, mark = c[j - 4], c[j - 3], c[j - 2], c[j - 1], marks[at - 1]
+                for k in range(w):
+                    free[k] = mark[k]
+                bend_row(low[at], high[at], n0, n1, n2, n3, row, free, least, most)
+                steady[at] = False
         if wraps:
             low[0], high[0], low[n + 1], high[n + 1] = low[n], high[n], low[1], high[1]
-        flow, amount = np.empty((2, w)), np.empty((2, w))
+            steady[0], steady[n + 1] = steady[n], steady[1]
+        for j in range(n):
+            if not (steady[j] and steady[j + 1] and steady[j + 2]):
+                held, row = room[j], v[j + 1]
+                for k in range(w):
+                    row[k] = held[k]
+        v[0], v[n + 1] = v[n], v[1]
+        flow, amount, calm = np.empty((2, w)), np.empty((2, w)), False
         for j in range(n + 1):
-            here, past = j % 2, (j + 1) % 2
+            q, now, was = through[j], flow[j % 2], flow[(j + 1) % 2]
+            more, less, old, still = amount[j % 2], amount[(j + 1) % 2], c[j + 1], calm
+            calm = steady[j] and steady[j + 1]
             for k in range(w):
-                flow[here, k] = dt * flux[i, j, start + k]
-            cross_row(
-                amount[here], flow[here], c[j + 1], low[j], high[j], v[j],
-                c[j + 2], low[j + 1], high[j + 1], v[j + 1],
-            )  # fmt: skip
-            if j > 0:
+                now[k] = dt * q[k]
+            if calm:
                 for k in range(w):
-                    out, lost = flow[here, k] - flow[past, k], amount[here, k] - amount[past, k]
-                    left = v[j, k] - out
-                    gain = (c[j + 1, k] * out - lost) / (left if left > 0.0 else 1.0)
-                    field[i, j - 1, start + k] = min(max(c[j + 1, k] + gain, least), most)
-                    volume[i, j - 1, start + k] = left
+                    more[k] = now[k] * old[k]
+            else:
+                cross_row(
+                    more, now, old, low[j], high[j], v[j], c[j + 2], low[j + 1], high[j + 1],
+                    v[j + 1],
+                )  # fmt: skip
+            if j > 0 and calm and still:
+                held = room[j - 1]
+                for k in range(w):
+                    held[k] -= now[k] - was[k]
+            elif j > 0:
+                line, held, before_it = lines[j - 1], room[j - 1], v[j]
+                for k in range(w):
+                    out, lost = now[k] - was[k], more[k] - less[k]
+                    left = before_it[k] - out
+                    gain = (old[k] * out - lost) / (left if left > 0.0 else 1.0)
+                    line[k] = min(max(old[k] + gain, least), most)
+                    held[k] = left
             if j == 0 or j == n:
-                for k in range(w):
-                    crossed[min(j, 1), i, start + k] = amount[here, k]
+                crossed[min(j, 1), i, strip] = more
     return crossed
 
 

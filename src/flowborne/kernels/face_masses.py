@@ -205,7 +205,7 @@ def even_out(
 @njit(nogil=True, cache=True)
 def give(now: Stage, f: int, more: float) -> None:
     """Let more of its amount per time leave one control volume after a stage, flat, in place."""
-    now.net[f] += more
+    now.kept[f] -= 0.5 * now.dt * more
     volume = now.volume[f] if now.volume[f] > now.nothing else 1.0
     now.later[f] -= now.weight * now.dt * more / volume
 

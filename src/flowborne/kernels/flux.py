@@ -21,6 +21,8 @@ ROOM = 0.5
 """Room of a value beyond its two neighbours where the field is smooth, in second differences: a
 parabola needs 1/8 between the samples beside its vertex, a third-order value 1/6."""
 
+SIXTH = 1.0 / 6.0
+
 CUT, CLEAR, UPSTREAM = range(3)
 """What may be used at the sides of a control volume: means with those beside it, values of third
 order, or what is upstream."""
@@ -50,8 +52,7 @@ class Stage(NamedTuple):
 
     later    the component after it; where the volume is not above `nothing`, what is left of the
              amount in place of the value
-    net      net amount that leaves each control volume per time: given by a stage of weight 1,
-             taken with 1 - `weight` by one of less
+    kept     before start - dt net / 2: set by a stage of weight 1, used by one of 1/2
     volume   after it
     weight   of what leaves in it
     dt       s
@@ -59,7 +60,7 @@ class Stage(NamedTuple):
     """
 
     later: Array
-    net: Array
+    kept: Array
     volume: Array
     weight: float
     dt: float
@@ -77,87 +78,67 @@ class Padded(NamedTuple):
 @inlined
 def in_line(now: Stage) -> Stage:
     """The same with flat arrays."""
-    later, net, volume = now.later.reshape(-1), now.net.reshape(-1), now.volume.reshape(-1)
-    return Stage(later, net, volume, now.weight, now.dt, now.nothing)
+    later, kept, volume = now.later.reshape(-1), now.kept.reshape(-1), now.volume.reshape(-1)
+    return Stage(later, kept, volume, now.weight, now.dt, now.nothing)
 
 
 @inlined
-def line_flux(
-    out: Array,
-    span: tuple[int, int],
-    q: Array,
-    rows: tuple[int, int],
-    share: Array,
-    field: Array,
-    marks: Marks,
-    across: tuple[int, int],
-) -> None:
-    """Flux x value at a row of sides, from the first to the end of `span`, all arrays flat.
+def side_flux(
+    g: float, line: tuple[float, float, float, float], here: np.uint8, there: np.uint8
+) -> float:
+    """Flux x value at a side, for the values behind, below, above and ahead of it.
 
-    What flows through each side is the mean of what flows through the faces of two cells. The
-    upwind value of third order (Leonard 1979) lies between both neighbours, but for smooth extrema,
-    where second differences on both sides agree; it is taken where both are CLEAR, what is upstream
-    where one is UPSTREAM, else the mean of both. Written without branches and views, and with
-    unsigned places, so that it vectorises.
-
-    rows    where in q the two rows of faces begin; share (2,) how much of each
-    across  where the row above the sides begins in the padded field, and what is between neighbours
-            across them
+    The upwind value of third order (Leonard 1979), the mean of both less a sixth of the second
+    difference upstream, lies between both, but for smooth extrema, where second differences on both
+    sides agree. It is taken where both marks are CLEAR, what is upstream where one is UPSTREAM,
+    else the mean. Written without branches, so that it vectorises.
     """
-    (one, other), (at, step), s, t = rows, across, share[0], share[1]
-    for k in range(span[0], span[1]):
-        g = s * q[one + k] + t * q[other + k]
-        n = at + k
-        low, high = field[n - step], field[n]
-        ahead, behind = field[n + step], field[n - step - step]
-        low_bend, high_bend = behind - 2.0 * low + high, low - 2.0 * high + ahead
-        room = max(min(low_bend, high_bend), 0.0) + max(min(-low_bend, -high_bend), 0.0)
-        least, most = min(low, high) - ROOM * room, max(low, high) + ROOM * room
-        forward = 5.0 * low + 2.0 * high - behind
-        value = (forward if g > 0.0 else 5.0 * high + 2.0 * low - ahead) / 6.0
-        value = min(max(value, least), most)
-        upstream = low if g > 0.0 else high
-        here, there = marks[n - step], marks[n]
-        either = upstream if here | there >= UPSTREAM else 0.5 * (low + high)
-        out[k] = g * (value if here & there == CLEAR else either)
+    behind, low, high, ahead = line
+    jump, mean = high - low, 0.5 * (low + high)
+    low_bend, high_bend = jump - (low - behind), (ahead - high) - jump
+    room = max(min(low_bend, high_bend), 0.0) - min(max(low_bend, high_bend), 0.0)
+    most = 0.5 * abs(jump) + ROOM * room
+    bend = SIXTH * (low_bend if g > 0.0 else high_bend)
+    either = mean
+    if here | there >= UPSTREAM:
+        either = low if g > 0.0 else high
+    return g * (mean - min(max(bend, -most), most) if here & there == CLEAR else either)
 
 
 @inlined
 def side_row(
-    out: Array,
-    count: int,
-    q: Array,
-    shape: tuple[int, int, int],
-    i: int,
-    j: int,
-    component: int,
-    place: Integers,
-    share: Array,
-    field: Array,
-    marks: Marks,
-    across: tuple[int, int],
-) -> None:
+    out: Array, count: int, q: Array, shape: tuple[int, int, int], i: int, j: int, component: int,
+    place: Integers, share: Array, field: Array, marks: Marks, across: tuple[int, int],
+) -> None:  # fmt: skip
     """Flux x value through `count` sides of the control volumes (i, j, :) of a component.
+
+    Places are unsigned, and there is one loop: else it is not vectorised.
 
     q             through the faces of the cells, across the axis of the sides; flat, of this shape
     place, share  (n, 2) which two of them along the component's axis, and how much of each
+    across        where the row above the sides begins in the padded field, and what is between
+                  neighbours across them
     """
     n1, n2, zero, one = np.uintp(shape[1]), np.uintp(shape[2]), np.uintp(0), np.uintp(1)
+    (at, step), line = across, i if component == 0 else (j if component == 1 else one)
+    first, second, s, t = place[line, 0], place[line, 1], share[line, 0], share[line, 1]
+    row, ends = (i * n1 + j) * n2, zero
     if component == 0:
-        low, high = np.uintp(place[i, 0]), np.uintp(place[i, 1])
-        rows = (low * n1 + j) * n2, (high * n1 + j) * n2
-        line_flux(out, (zero, count), q, rows, share[i], field, marks, across)
+        low, high = (np.uintp(first) * n1 + j) * n2, (np.uintp(second) * n1 + j) * n2
     elif component == 1:
-        low, high = np.uintp(place[j, 0]), np.uintp(place[j, 1])
-        rows = (i * n1 + low) * n2, (i * n1 + high) * n2
-        line_flux(out, (zero, count), q, rows, share[j], field, marks, across)
+        low, high = (i * n1 + np.uintp(first)) * n2, (i * n1 + np.uintp(second)) * n2
     else:
-        row = (i * n1 + j) * n2
-        rows = row - one, row
-        line_flux(out, (one, count - one), q, rows, share[1], field, marks, across)
-        for k in (zero, count - one):
-            rows = row + np.uintp(place[k, 0]) - k, row + np.uintp(place[k, 1]) - k
-            line_flux(out, (k, k + one), q, rows, share[k], field, marks, across)
+        low, high, ends = row - one, row, one
+    for k in range(ends, count - ends):
+        n, g = at + k, s * q[low + k] + t * q[high + k]
+        four = field[n - step - step], field[n - step], field[n], field[n + step]
+        out[k] = side_flux(g, four, marks[n - step], marks[n])
+    for end in range(ends + ends):
+        last = (count - one) * end
+        m, one_face, other_face = at + last, np.uintp(place[last, 0]), np.uintp(place[last, 1])
+        g = share[last, 0] * q[row + one_face] + share[last, 1] * q[row + other_face]
+        four = field[m - step - step], field[m - step], field[m], field[m + step]
+        out[last] = side_flux(g, four, marks[m - step], marks[m])
 
 
 @kernel
@@ -168,70 +149,62 @@ def stage(now: Stage, start: Array, before: Array, padded: Padded, flux: Fluxes)
     """
     q, component, place, share = flux
     qx, qy, qz = q[0].reshape(-1), q[1].reshape(-1), q[2].reshape(-1)
-    out, weight, dt, nothing = now.later, now.weight, now.dt, now.nothing
-    n0, n1, n2 = np.uintp(out.shape[0]), np.uintp(out.shape[1]), np.uintp(out.shape[2])
+    n0, n1, n2 = np.uintp(start.shape[0]), np.uintp(start.shape[1]), np.uintp(start.shape[2])
     field, values, mark = padded.values, padded.values.reshape(-1), padded.marks.reshape(-1)
-    later, leaving, high = out.reshape(-1), now.net.reshape(-1), now.volume.reshape(-1)
-    first, low = start.reshape(-1), before.reshape(-1)
-    zero, one, deep = np.uintp(0), np.uintp(1), np.uintp(GHOSTS)
-    room = field.shape[0] > out.shape[0]
+    (later, kept, high, weight, _, nothing), half = in_line(now), 0.5 * now.dt
+    first, low, room = start.reshape(-1), before.reshape(-1), field.shape[0] > start.shape[0]
+    zero, one, deep, planes = np.uintp(0), np.uintp(1), np.uintp(GHOSTS), np.uintp(PLANES)
     p = deep if room else zero
     rows, wide = np.uintp(field.shape[1]), np.uintp(field.shape[2])
-    earlier, alone = 1.0 - weight, weight == 1.0
-    planes = np.uintp(PLANES)
-    for block in prange((out.shape[0] + PLANES - 1) // PLANES):
+    for block in prange((start.shape[0] + PLANES - 1) // PLANES):
         bottom = np.uintp(block) * planes
-        side, row = np.empty(out.shape[2] + 1), np.empty(out.shape[2])
-        sums, below = np.empty(out.shape[2]), np.empty(out.shape[1] * out.shape[2])
+        side, row, net = np.empty(n2 + one), np.empty(n2), np.empty(n2)
+        below = np.empty(n1 * n2)
         x_place, x_share = place[int(component == 0)], share[int(component == 0)]
         y_place, y_share = place[int(component == 1)], share[int(component == 1)]
         z_place, z_share = place[int(component == 2)], share[int(component == 2)]
         for i in range(bottom, min(bottom + planes, n0)):
-            for j in range(n1 + one):
-                at = ((i + p) * rows + j + deep) * wide + deep
-                side_row(
-                    row, n2, qy, q[1].shape, i, j, component, y_place, y_share, values, mark,
-                    (at, wide),
-                )  # fmt: skip
-                if j > zero:
-                    n = (i * n1 + j - one) * n2
-                    for k in range(n2):
-                        sums[k] += row[k]
-                    if alone:
-                        for k in range(n2):
-                            leaving[n + k] = sums[k]
-                    else:
-                        for k in range(n2):
-                            sums[k] = weight * sums[k] + earlier * leaving[n + k]
-                    for k in range(n2):
-                        volume = high[n + k]
-                        amount = low[n + k] * first[n + k] - dt * sums[k]
-                        later[n + k] = amount / (volume if volume > nothing else 1.0)
-                if j == n1:
-                    break
+            at = ((i + p) * rows + deep) * wide + deep
+            side_row(
+                row, n2, qy, q[1].shape, i, zero, component, y_place, y_share, values, mark,
+                (at, wide),
+            )  # fmt: skip
+            for j in range(n1):
+                at, n, m = ((i + p) * rows + j + deep) * wide + deep, (i * n1 + j) * n2, j * n2
                 side_row(
                     side, n2 + one, qz, q[2].shape, i, j, component, z_place, z_share, values,
                     mark, (at, one),
                 )  # fmt: skip
                 for k in range(n2):
-                    sums[k] = side[k + one] - side[k] - row[k]
-                if not room:
-                    continue
-                n = j * n2
-                if i == bottom:
-                    side_row(
-                        row, n2, qx, q[0].shape, i, j, component, x_place, x_share, values, mark,
-                        (at, rows * wide),
-                    )  # fmt: skip
-                    for k in range(n2):
-                        below[n + k] = row[k]
+                    net[k] = side[k + one] - side[k] - row[k]
                 side_row(
-                    row, n2, qx, q[0].shape, i + one, j, component, x_place, x_share, values, mark,
-                    (at + rows * wide, rows * wide),
+                    row, n2, qy, q[1].shape, i, j + one, component, y_place, y_share, values, mark,
+                    (at + wide, wide),
                 )  # fmt: skip
                 for k in range(n2):
-                    sums[k] += row[k] - below[n + k]
-                    below[n + k] = row[k]
+                    net[k] += row[k]
+                if room:
+                    if i == bottom:
+                        side_row(
+                            side, n2, qx, q[0].shape, i, j, component, x_place, x_share, values,
+                            mark, (at, rows * wide),
+                        )  # fmt: skip
+                        for k in range(n2):
+                            below[m + k] = side[k]
+                    side_row(
+                        side, n2, qx, q[0].shape, i + one, j, component, x_place, x_share, values,
+                        mark, (at + rows * wide, rows * wide),
+                    )  # fmt: skip
+                    for k in range(n2):
+                        net[k] += side[k] - below[m + k]
+                        below[m + k] = side[k]
+                if weight == 1.0:
+                    for k in range(n2):
+                        kept[n + k] = low[n + k] * first[n + k] - half * net[k]
+                for k in range(n2):
+                    volume = high[n + k]
+                    left = kept[n + k] - half * net[k]
+                    later[n + k] = left / (volume if volume > nothing else 1.0)
 
 
 @kernel

@@ -36,10 +36,11 @@ from numba import prange as prange
 P = ParamSpec("P")
 R = TypeVar("R")
 
-inlined = njit(forceinline=True, nogil=True, cache=True)
+inlined = njit(forceinline=True, nogil=True, cache=True, error_model="numpy")
 """For what is called at every cell or face: inlined by LLVM, which compiles far sooner than by
 Numba. What goes through a row or a plane is a kernel: inlined, it would be compiled anew at every
-place that calls it, and once more in all that these are called from."""
+place that calls it, and once more in all that these are called from. A division by 0 gives what
+IEEE says, here and in kernels: loops that stop at one are not vectorised."""
 
 ONLY_PRANGE = {
     "comprehension": False,
@@ -149,7 +150,7 @@ class Kernel(Generic[P, R]):
         self.__doc__ = function.__doc__
         self.__name__ = function.__name__
         self.__wrapped__ = function
-        self.serial: Any = njit(nogil=True, cache=True)(function)
+        self.serial: Any = njit(nogil=True, cache=True, error_model="numpy")(function)
         self._twin: Any = None
 
     def __call__(self, *args: P.args, **kwargs: P.kwargs) -> R:
@@ -192,7 +193,9 @@ class Kernel(Generic[P, R]):
                 copy.__qualname__ = name
                 copy.__module__ = function.__module__
                 option = ONLY_PRANGE if "prange" in names else False
-                self._twin = njit(nogil=True, cache=True, parallel=option)(copy)
+                self._twin = njit(nogil=True, cache=True, error_model="numpy", parallel=option)(
+                    copy
+                )
         return self._twin
 
 

@@ -60,12 +60,10 @@ def net_flux_reference(field: Array, marks: Marks, gx: Array, gy: Array, gz: Arr
 def stage_reference(
     now: Stage, start: Array, before: Array, padded: Padded, flux: Fluxes
 ) -> tuple[Array, Array]:
-    """`stage` in NumPy: the component after it, and the net amount that left it."""
-    leaving = now.weight * net_flux_reference(*padded, *side_fluxes_reference(flux))
-    if now.weight < 1.0:
-        leaving += (1.0 - now.weight) * now.net
-    amount = before * start - now.dt * leaving
-    return amount / np.where(now.volume > now.nothing, now.volume, 1.0), leaving
+    """`stage` in NumPy: the component after it, and what was kept for the next one."""
+    half = 0.5 * now.dt * net_flux_reference(*padded, *side_fluxes_reference(flux))
+    kept = before * start - half if now.weight == 1.0 else now.kept
+    return (kept - half) / np.where(now.volume > now.nothing, now.volume, 1.0), kept
 
 
 def largest_crossing_reference(q: Faces) -> float:
