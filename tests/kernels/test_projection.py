@@ -58,7 +58,10 @@ def test_push_faces(shape: tuple[int, int, int], axis: int, sides: tuple[int, in
         np.moveaxis(rate, axis, 0)[-end] = 0.0
     expected = subtract_gradient_reference(velocity, rate, pressure, axis, 0.7, sides)
     thin, periodic = velocity.copy(), sides[0] == PERIODIC
+    twin = velocity.copy()
+    subtract_gradient.parallel(twin, rate, pressure, axis, 0.7, periodic)
     subtract_gradient(velocity, rate, pressure, axis, 0.7, periodic)
+    np.testing.assert_array_equal(twin, velocity)
     np.testing.assert_allclose(velocity, expected, atol=1e-14)
     if shape[2] == 1 and axis < 2:
         grid = Grid(shape, 0.1)

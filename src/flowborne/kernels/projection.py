@@ -74,7 +74,8 @@ def subtract_gradient(
     periodic  whether the domain is along the axis; else the pressure beyond the sides is 0
     """
     n, wide = pressure.shape[axis], velocity.shape[2]
-    for i in prange(velocity.shape[0]):
+    for row in prange(velocity.shape[0]):
+        i = np.int64(row)  # signed in the parallel twin too
         for j in range(velocity.shape[1]):
             at = i if axis == 0 else j
             below, above = at - 1 if at > 0 else n - 1, at if at < n else 0
