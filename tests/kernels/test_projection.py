@@ -10,7 +10,7 @@ import pytest
 from flowborne.fluid.ghosts import plane, planes
 from flowborne.fluid.grid import Grid
 from flowborne.kernels.arrays import FREE, PERIODIC, PRESCRIBED
-from flowborne.kernels.projection import net_out, open_outflow, subtract_gradient
+from flowborne.kernels.projection import mark_unsettled, net_out, open_outflow, subtract_gradient
 
 from .references.outflow import outflow_reference
 from .references.pressure_gradient import subtract_gradient_reference
@@ -46,6 +46,28 @@ def test_open_outflow(shape: tuple[int, int, int]) -> None:
     open_outflow(out, tuple(opened), tuple(velocity), rate, 0.3)
     expected = 0.3 * outflow_reference(velocity, opened) - rate
     np.testing.assert_allclose(out, expected, atol=1e-14)
+
+
+@pytest.mark.parametrize("shape", SHAPES[:2])
+def test_cells_that_are_cut_or_that_fluxes_do_not_fill_are_marked(
+    shape: tuple[int, int, int],
+) -> None:
+    random, grid, dt, slack = np.random.default_rng(5), Grid(shape, 1.0), 0.3, 1e-6
+    flux, rate, marks = faces(shape, 0), random.random(shape), np.empty(shape, np.uint8)
+    if grid.is_slab:
+        flux[2][:] = 0.0
+    before, end = (np.where(random.random(shape) < 0.2, 0.7, 1.0) for _ in range(2))
+    net = outflow_reference(flux, [np.ones(q.shape) for q in flux])
+    off = slack * random.choice([-2.0, -0.6, 0.0, 0.6, 2.0], shape)
+    start = end - dt * (rate - net) + off
+    volumes = tuple(plane(v, grid) for v in (start, rate, before, end))
+    given = planes((flux[0], flux[1], flux[2]), grid), dt, 1.0, slack
+    mark_unsettled(plane(marks, grid), volumes, *given)
+    expected = (before < 1.0) | (end < 1.0) | (np.abs(off) > slack)
+    np.testing.assert_array_equal(marks.astype(bool), expected)
+    marks[:] = 2
+    mark_unsettled.parallel(plane(marks, grid), volumes, *given)
+    np.testing.assert_array_equal(marks.astype(bool), expected)
 
 
 @pytest.mark.parametrize("shape", SHAPES)

@@ -14,18 +14,23 @@ mean of both ends it joins the two sides of the body, and fluid would flow throu
 aside while the field is solved for: what it held goes to the cell before the body, and what it
 holds at last comes from that behind.
 
-A closed region of fluid keeps its volume, but that of the cells around a moving body wavers a
-little on any grid: there all volumes at the end are scaled alike, by 1e-5 to 1e-3.
+Away from what moves the velocity fills whole cells already, so the solve takes place in a band
+(`band`): what flows through its rim is kept. A closed region of fluid, such as the band, keeps its
+volume, but that of the cells around a moving body varies a little on any grid: there the volumes of
+cut cells at the end are scaled, the more the more they are closed, by 1e-5 to 1e-2.
 
 Method: docs/method/leak-proof.md.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
+from flowborne.coupling.band import Band, Projection, band_around
 from flowborne.coupling.cut import Departure
 from flowborne.coupling.fractions import Geometry
 from flowborne.coupling.operators import beyond_sides
@@ -35,11 +40,11 @@ from flowborne.fluid.control_volumes import NONE
 from flowborne.fluid.ghosts import impose_sides, plane, planes
 from flowborne.fluid.grid import Grid
 from flowborne.fluid.projection import PressureGradient
-from flowborne.kernels.arrays import PERIODIC, PRESCRIBED, Array, Faces, Integers
+from flowborne.kernels.arrays import PERIODIC, PRESCRIBED, Array, Faces, Integers, Marks
 from flowborne.kernels.control_volumes import neighbour
 from flowborne.kernels.dye import face_of
 from flowborne.kernels.faces import mean_flux
-from flowborne.kernels.projection import net_out
+from flowborne.kernels.projection import Volumes, mark_unsettled, net_out
 from flowborne.solvers.pressure import PressureSystem
 
 TOLERANCE = 1e-9
@@ -49,6 +54,19 @@ the volumes until the next step, and the smallest of them must not feel it."""
 LEFT = 1e-10
 """Parts of a whole cell that may be left of the volume of all cells (the root of the sum of their
 squares), where that is reached first."""
+
+FINER = 1e-2
+"""Factor on both in a band. Cells that leave it become whole, so a uniform flow is off by what was
+left in them; and weights of whole cells should be even to `kernels.even.ROUNDING`."""
+
+SETTLED = 10.0
+"""Part of a whole cell by which its volume may be off before the band takes it in, relative to the
+tolerance of the pressure: what that left is no reason to correct it."""
+
+SCALED = 2e-2
+"""Most by which the volume of a cell that is nearly closed may be scaled to balance a closed
+region; that of a half open one by half as much. 1.2e-2 is needed beside a fish, 1e-3 beside a
+block. Where more is missing, what moves displaces fluid far away as well."""
 
 MOST = 2.0
 """Factor on the volumes of a closed region beyond which it is a pocket that bodies crush, and is
@@ -69,7 +87,8 @@ def leak_proof_flux(
     after      the cut grid at its end
     """
     state, before, cells = departure.state, departure.cut, departure.volumes.cells
-    grid, sides = departure.fluid.grid, departure.fluid.boundaries
+    fluid = departure.fluid
+    grid, sides = fluid.grid, fluid.boundaries
     flux, weights = grid.zeros_faces(), grid.zeros_faces()
     for axis in grid.axes:
         ends = before.open[axis], after.open[axis]
@@ -81,27 +100,92 @@ def leak_proof_flux(
     drive_sides(flux, weights, grid, sides, world.time + 0.5 * dt)
     swept = swept_cells(before, after, cells, grid, sides)
     start, end = swept.set_aside(flux, weights, cells, after.volume)
-    if before is not after or world.still is None or world.still[0] is not after:
+    volumes, slack = (start, departure.rate, before.volume, end), SETTLED * fluid.tolerance
+    band, later = band_around(unsettled(volumes, flux, grid, dt, slack), grid, sides), None
+    if band is not None:
+        own, box = band.own(flux), band.cells
+        inside = partial(PressureGradient, band.inner(weights), 0.0, None, band.grid, Boundaries())
+        held = start[box] + dt * departure.rate[box]
+        projection = kept(world, before, after, band, inside)
+        found = corrected(own, held, end[box], projection, dt, True)
+        if found is not None:
+            later = end.copy()
+            later[box] = found
+            for axis in grid.axes:
+                flux[axis][band.faces(axis)] = own[axis]
+    if later is None:
         if dipoles is not None:
             through = [weights[p.axis][p.layer] > 0.0 for p in places]  # not of cells set aside
             dipoles = dipoles.on([a & b for a, b in zip(uncut, through, strict=True)])
-        gradient = PressureGradient(weights, 2.0 * stiffness(grid), dipoles, grid, sides)
-        beyond = beyond_sides(dipoles, gradient.whole)
-        system = PressureSystem(weights, sides.periodic(), beyond=beyond)
-        world.still = (after, gradient, system) if before is after else None
-    else:
-        _, gradient, system = world.still
-    rhs, net = volume_rates(system, start, end, departure.rate, dt), np.empty(grid.shape)
-    net_out(plane(net, grid), *planes(flux, grid))
-    rhs += net
-    left = LEFT * grid.cell_volume / dt
-    solution = system.solve(-rhs, None, tolerance=TOLERANCE, absolute=left)
-    gradient.subtract(flux, solution.pressure, 1.0)
-    net_out(plane(net, grid), *planes(flux, grid))
-    later = start + dt * (departure.rate - net)
+        whole = partial(PressureGradient, weights, 2.0 * stiffness(grid), dipoles, grid, sides)
+        projection = kept(world, before, after, None, whole)
+        later = corrected(flux, start + dt * departure.rate, end, projection, dt, False)
+    assert later is not None
     swept.put_back(flux, later, end, dt)
     later[(later == 0.0) & (cells != 0.0)] = FILLED * grid.cell_volume
     return flux, later
+
+
+def unsettled(volumes: Volumes, flux: Faces, grid: Grid, dt: float, slack: float) -> Marks:
+    """(nx, ny, nz) which cells have to be corrected: that bodies cut at either end of the step, or
+    that the fluxes do not fill.
+
+    volumes  see `mark_unsettled`
+    slack    part of a whole cell by which its volume may be off
+    """
+    marks, cell = np.empty(grid.shape, np.uint8), grid.cell_volume
+    start, rate, before, end = (plane(v, grid) for v in volumes)
+    given = plane(marks, grid), (start, rate, before, end), planes(flux, grid)
+    mark_unsettled(*given, dt, cell, slack * cell)
+    return marks
+
+
+def kept(
+    world: World,
+    before: Geometry,
+    after: Geometry,
+    band: Band | None,
+    gradient: Callable[[], PressureGradient],
+) -> Projection:
+    """The projection in a band or, without one, the whole grid: that of the last step while bodies
+    stand."""
+    still = world.still
+    if still is None or still[0] is not after or still[1] != band:
+        made = gradient()
+        beyond = beyond_sides(made.dipoles, made.whole)
+        system = PressureSystem(made.rate, made.boundaries.periodic(), beyond=beyond)
+        still = after, band, (made, system)
+    world.still = still if before is after else None
+    return still[2]
+
+
+def corrected(
+    flux: Faces, held: Array, wanted: Array, projection: Projection, dt: float, in_band: bool
+) -> Array | None:
+    """Correct fluxes, in place, so that they lead to the volumes that are wanted, and give those
+    that they lead to; None, and no change, where a band cannot be balanced.
+
+    held     volumes at the start and what is brought in, m^3
+    in_band  whether these are of a part of the grid
+    """
+    gradient, system = projection
+    grid = gradient.grid
+    reached = led_to(flux, held, grid, dt)
+    target = balanced(system, reached, wanted, grid, alike=not in_band)
+    if target is None:
+        return None
+    finer = FINER if in_band else 1.0
+    left, missing = finer * LEFT * grid.cell_volume / dt, (reached - target) / dt
+    solution = system.solve(missing, None, tolerance=finer * TOLERANCE, absolute=left)
+    gradient.subtract(flux, solution.pressure, 1.0)
+    return led_to(flux, held, grid, dt)
+
+
+def led_to(flux: Faces, held: Array, grid: Grid, dt: float) -> Array:
+    """Volumes of cells after fluxes have flowed for a time, m^3."""
+    net = np.empty(grid.shape)
+    net_out(plane(net, grid), *planes(flux, grid))
+    return held - dt * net
 
 
 def stiffness(grid: Grid) -> float:
@@ -123,22 +207,30 @@ def drive_sides(flux: Faces, weights: Faces, grid: Grid, sides: Boundaries, time
             weight *= 2.0 * side.pressure_weight(place)
 
 
-def volume_rates(
-    system: PressureSystem, cells: Array, later: Array, rate: Array, dt: float
-) -> Array:
-    """(nx, ny, nz) what the volume of each cell grows by less what is brought into it, m^3/s; sums
-    to 0 over every closed region."""
-    target = later.copy()
-    if system.regions:
-        label = system.closed_regions()
-        inside = label >= 0
-        number = label[inside]
-        held = np.bincount(number, cells[inside] + dt * rate[inside], system.regions)
-        wanted = np.bincount(number, later[inside], system.regions)
-        factor = np.divide(held, wanted, out=np.ones(system.regions), where=wanted > 0.0)
-        factor[factor > MOST] = 1.0
-        target[inside] *= factor[number]
-    return (target - cells) / dt - rate
+def balanced(
+    system: PressureSystem, reached: Array, wanted: Array, grid: Grid, alike: bool
+) -> Array | None:
+    """(nx, ny, nz) volumes at the end, whose sum over every closed region is that of the volumes
+    reached: those that are wanted, V, with a part s (1 - V / h^3) more, of at most |s| = SCALED.
+
+    alike  whether a region that this does not balance has all of them scaled by one factor; else
+           None is given
+    """
+    if not system.regions:
+        return wanted
+    label, count = system.closed_regions(), system.regions
+    inside = label >= 0
+    number, volume, target = label[inside], wanted[inside], wanted.copy()
+    give = volume * np.maximum(1.0 - volume / grid.cell_volume, 0.0)
+    there, total, most = (np.bincount(number, v, count) for v in (reached[inside], volume, give))
+    astray = np.abs(there - total) > SCALED * most
+    if astray.any() and not alike:
+        return None
+    part = np.where(astray, total, most)
+    scaled = np.divide(there - total, part, out=np.zeros(count), where=part > 0.0)
+    scaled[scaled > MOST - 1.0] = 0.0
+    target[inside] += scaled[number] * np.where(astray[number], volume, give)
+    return target
 
 
 LEAST = 1e-3

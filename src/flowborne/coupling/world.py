@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
+from flowborne.coupling.band import Band, Projection
 from flowborne.coupling.fractions import Geometry
 from flowborne.coupling.mouths import Mouth
 from flowborne.coupling.shapes import Shapes, shapes
 from flowborne.fluid.boundary import Boundaries, Source
 from flowborne.fluid.control_volumes import ControlVolumes
 from flowborne.fluid.grid import Grid
-from flowborne.fluid.projection import PressureGradient
 from flowborne.fluid.state import FluidState, under
 from flowborne.fluid.wake import wake_shape
 from flowborne.fluid.window import Window, crosses
@@ -23,7 +23,6 @@ from flowborne.kernels.arrays import Array
 from flowborne.solids.model import SolidModel, SolidState
 from flowborne.solids.trajectories import NOTHING_TOLD, Told, Trajectory
 from flowborne.solids.wind import Wind
-from flowborne.solvers.pressure import PressureSystem
 
 TRIAL_TOLERANCE = 1e-5
 """Relative residual of the pressure in a hypothetical step: gradients are right to 1e-3."""
@@ -144,8 +143,8 @@ class World:
     cut     the positions (nq,) for which the grid was cut last, and that cut: made from the state,
             and not part of it
     volumes the cut that the last step ended with, and its control volumes; likewise
-    still   the cut that did not change in the last step, and the gradient and the matrix of its
-            leak-proof projection, which a copy makes anew; likewise
+    still   the cut that did not change in the last step, the band of its leak-proof projection, and
+            that projection, which a copy makes anew; likewise
     splitting
             make the added-mass part of forces, for each part of the last step; likewise
     """
@@ -161,7 +160,7 @@ class World:
     told: Told = NOTHING_TOLD
     cut: tuple[Array, Geometry] | None = field(default=None, repr=False, compare=False)
     volumes: tuple[Geometry, ControlVolumes] | None = field(default=None, repr=False, compare=False)
-    still: tuple[Geometry, PressureGradient, PressureSystem] | None = field(
+    still: tuple[Geometry, Band | None, Projection] | None = field(
         default=None, repr=False, compare=False
     )
     splitting: tuple[Callable[[], Array], ...] = field(default=(), repr=False, compare=False)

@@ -8,10 +8,12 @@ from __future__ import annotations
 import numpy as np
 from numba import njit, prange
 
-from flowborne.kernels.arrays import Array, Faces, Integers
+from flowborne.kernels.arrays import Array, Faces, Integers, Marks
 from flowborne.kernels.control_volumes import across_axis, neighbour
 from flowborne.kernels.dye import face_of
 from flowborne.kernels.jit import inlined, kernel
+
+Volumes = tuple[Array, Array, Array, Array]
 
 
 @kernel
@@ -24,6 +26,29 @@ def net_out(out: Array, qx: Array, qy: Array, qz: Array) -> None:
                 total = qx[i + deep, j, k] - qx[i, j, k]
                 total = total + qy[i, j + 1, k] - qy[i, j, k]
                 out[i, j, k] = total + qz[i, j, k + 1] - qz[i, j, k]
+
+
+@kernel
+def mark_unsettled(
+    marks: Marks, volumes: Volumes, flux: Faces, dt: float, cell: float, slack: float
+) -> None:
+    """Mark cells that bodies cut, and those that fluxes do not fill.
+
+    volumes  of cells at the start and what is brought in per time; of the cut at the start and at
+             the end; as `net_out` takes fields
+    cell     volume of a whole cell
+    slack    by which the volume after dt may differ from that of the cut
+    """
+    (start, rate, before, end), (qx, qy, qz) = volumes, flux
+    deep = qx.shape[0] - start.shape[0]
+    for i in prange(start.shape[0]):
+        for j in range(start.shape[1]):
+            for k in range(start.shape[2]):
+                net = qx[i + deep, j, k] - qx[i, j, k] + qy[i, j + 1, k] - qy[i, j, k]
+                net += qz[i, j, k + 1] - qz[i, j, k]
+                left = start[i, j, k] + dt * (rate[i, j, k] - net) - end[i, j, k]
+                cut = min(before[i, j, k], end[i, j, k]) < cell
+                marks[i, j, k] = cut or not abs(left) <= slack
 
 
 @inlined
