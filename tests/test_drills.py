@@ -243,8 +243,8 @@ def test_a_number_that_is_not_finite_never_ends_well(small_scene, tmp_path, monk
 
     values = Columns.values
 
-    def spoilt(columns, now):
-        return values(columns, now) | ({"lift_N": np.nan} if now.frame == 5 else {})
+    def spoilt(columns, now, **given):
+        return values(columns, now, **given) | ({"lift_N": np.nan} if now.frame == 5 else {})
 
     monkeypatch.setattr(Columns, "values", spoilt)
     result = run(small_scene, tmp_path / "run")
