@@ -211,7 +211,7 @@ class Simulation:
             report = self._advance(world, self.frame + 1, beyond)
         world.told = NOTHING_TOLD
         moment = Snapshot(world, report.frame, report)
-        lost = self.columns.lost(self.columns.values(moment, split=splits))
+        lost = self.columns.lost(self.columns.values(moment, split=False))
         if lost:
             raise BlowUpError(report.frame, self.steps_per_frame, f"{lost} is not a finite number")
         self._moment = moment
