@@ -15,9 +15,11 @@ aside while the field is solved for: what it held goes to the cell before the bo
 holds at last comes from that behind.
 
 Away from what moves the velocity fills whole cells already, so the solve takes place in a band
-(`band`): what flows through its rim is kept. A closed region of fluid, such as the band, keeps its
-volume, but that of the cells around a moving body varies a little on any grid: there the volumes of
-cut cells at the end are scaled, the more the more they are closed, by 1e-5 to 1e-2.
+(`band`): what flows through its rim is kept. Outside cells are whole again, whatever pressures left
+of them; that would be missing from the amount of dyes, with which the band is the whole grid. A
+closed region of fluid, such as the band, keeps its volume, but that of the cells around a moving
+body varies a little on any grid: there the volumes of cut cells at the end are scaled, the more the
+more they are closed, by 1e-5 to 1e-2.
 
 Method: docs/method/leak-proof.md.
 """
@@ -100,8 +102,10 @@ def leak_proof_flux(
     drive_sides(flux, weights, grid, sides, world.time + 0.5 * dt)
     swept = swept_cells(before, after, cells, grid, sides)
     start, end = swept.set_aside(flux, weights, cells, after.volume)
-    volumes, slack = (start, departure.rate, before.volume, end), SETTLED * fluid.tolerance
-    band, later = band_around(unsettled(volumes, flux, grid, dt, slack), grid, sides), None
+    band, later = None, None
+    if not state.scalars:
+        volumes, slack = (start, departure.rate, before.volume, end), SETTLED * fluid.tolerance
+        band = band_around(unsettled(volumes, flux, grid, dt, slack), grid, sides)
     if band is not None:
         own, box = band.own(flux), band.cells
         inside = partial(PressureGradient, band.inner(weights), 0.0, None, band.grid, Boundaries())
