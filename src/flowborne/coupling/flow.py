@@ -65,13 +65,13 @@ def advect(
 ) -> tuple[AdvectionResult, Dyed]:
     """Velocity and scalars a step later; `velocity` (Faces, m/s) is that at the start."""
     fluid, state = world.flow()
-    dyed = Dyed({}, 0.0)
+    carried, dyed = advect_momentum(start, velocity, transport), Dyed({}, 0.0)
     if state.scalars:
         inflow = brought_by(start.jets, start.rate, tuple(state.scalars))
         backwards = world.steps % 2 == 1
         passage = Passage(transport, inflow, fluid.grid, fluid.boundaries, backwards)
         dyed = carry_dye(state.scalars, passage, fluid.sources)
-    return advect_momentum(start, velocity, transport), dyed
+    return carried, dyed
 
 
 def advect_momentum(start: Departure, velocity: Faces, transport: Transport) -> AdvectionResult:

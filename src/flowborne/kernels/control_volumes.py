@@ -385,7 +385,7 @@ def share_velocity(field: Array, closed: Closed) -> None:
 
 
 @njit(nogil=True, cache=True)
-def mark_cut(marks: Marks, listed: Integers, shape: Integers, wraps: Integers, reach: int) -> None:
+def mark_cut(marks: Marks, listed: Integers, shape: Three, wraps: Three, reach: int) -> None:
     """Set to 0 the marks, padded or not, of listed places of a field of this shape, and of those up
     to `reach` beyond them along each axis, in place."""
     n1, n2, flat = shape[1], shape[2], marks.reshape(-1)
