@@ -46,7 +46,7 @@ def test_threads_change_no_bit() -> None:
     first, before, after, weight = fields((40, 33, 37), 4)
     sums = weighted_sums(weight, first, before, after)
     assert (weighted_sums.parallel(weight, first, before, after) == sums).all()
-    assert largest_open.parallel(before, after) == largest_open(before, after)
+    assert largest_open.parallel(before, after, 0.0) == largest_open(before, after, 0.0)
 
 
 @SHAPES
@@ -99,6 +99,7 @@ def test_weighted_sums(shape: Shape) -> None:
 @SHAPES
 def test_largest_open(shape: Shape) -> None:
     field, opened = fields(shape, 2)
-    expected = np.abs(field).max(where=opened > 0.0, initial=0.0)
-    assert largest_open(field, opened) == expected
+    for part in (0.0, 0.5):
+        expected = np.abs(field).max(where=opened > part, initial=0.0)
+        assert largest_open(field, opened, part) == expected
     assert largest_size(field) == np.abs(field).max()

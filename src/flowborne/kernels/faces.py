@@ -161,13 +161,13 @@ def largest_size(field: Array) -> float:
 
 
 @kernel
-def largest_open(field: Array, opened: Array) -> float:
-    """Largest size of a field on faces that are not wholly closed."""
+def largest_open(field: Array, opened: Array, more_than: float) -> float:
+    """Largest size of a field on faces of which more than a part is open."""
     values, part, most = flat(field), flat(opened), np.zeros(field.shape[0])
     for i in prange(values.shape[0]):
         found = 0.0
         for k in range(values.shape[1]):
-            size = abs(values[i, k]) if part[i, k] > 0.0 else 0.0
+            size = abs(values[i, k]) if part[i, k] > more_than else 0.0
             found = size if size > found else found
         most[i] = found
     return float(most.max())
