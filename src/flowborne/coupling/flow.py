@@ -89,8 +89,10 @@ def advect_momentum(start: Departure, velocity: Faces, transport: Transport) -> 
     cells = cells_with_inlets(jets, start.sources, fluid.sources, grid)
     for axis in grid.axes:
         inlets = inlets_across(axis, cells, jets, start.sources, grid, sides)
-        along = np.empty(velocity[axis].shape)
-        still_to_come(along, state.acceleration[axis], velocity[axis], state.velocity[axis], dt)
+        along, was = state.acceleration[axis], state.velocity[axis]
+        if velocity[axis] is not was:
+            along = np.empty(was.shape)
+            still_to_come(along, state.acceleration[axis], velocity[axis], was, dt)
         carried = carry_component(velocity[axis], along, axis, transport, inlets, grid, sides)
         arrived.insert(axis, carried.velocity)
         crossed[axis] = fluid.density * carried.crossed
