@@ -80,13 +80,13 @@ def sample() -> tuple[CutCells, np.ndarray, np.ndarray]:
     fluxes = flows(ROOM, random)
     fluxes[0][-1] = fluxes[0][0]
     listed = np.flatnonzero(random.random(ROOM) < 0.3)
-    wraps, shape = np.array([ROOM[0], 0, 0]), np.array(ROOM)
+    wraps = ROOM[0], 0, 0
     unknown = np.full((2, listed.size, 6), -1)
     cells = CutCells(listed, *unknown, np.zeros((listed.size, 6)))
     kept = [flux.copy() for flux in fluxes]
     for axis in range(3):
-        list_flows(cells, axis, fluxes[axis], wraps, shape)
-    beside, row = beside_reference(listed, shape, wraps)
+        list_flows(cells, axis, fluxes[axis], wraps, ROOM)
+    beside, row = beside_reference(listed, np.array(ROOM), np.array(wraps))
     np.testing.assert_array_equal(cells.beside, beside)
     np.testing.assert_array_equal(cells.row, row)
     gone = (np.diff(was - q, axis=a) for a, (was, q) in enumerate(zip(kept, fluxes, strict=True)))

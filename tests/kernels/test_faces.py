@@ -14,7 +14,7 @@ from flowborne.kernels.faces import (
     mean_row,
     still_to_come,
     weigh,
-    weighted_change,
+    weighted_sums,
 )
 
 from .cut_cells import face_shape
@@ -43,10 +43,10 @@ def test_mean_row(shape: Shape, axis: int, periodic: bool) -> None:
 
 def test_threads_change_no_bit() -> None:
     """Of what is not one operation for each face."""
-    before, after, weight = fields((40, 33, 37), 3)
-    change = weighted_change(weight, before, after)
-    assert weighted_change.parallel(weight, before, after) == change
-    assert largest_open.parallel(before, after) == largest_open(before, after)
+    first, before, after, weight = fields((40, 33, 37), 4)
+    sums = weighted_sums(weight, first, before, after)
+    assert (weighted_sums.parallel(weight, first, before, after) == sums).all()
+    assert largest_open.parallel(before, after, 0.0) == largest_open(before, after, 0.0)
 
 
 @SHAPES
@@ -88,16 +88,18 @@ def test_a_velocity_goes_on(shape: Shape) -> None:
 
 
 @SHAPES
-def test_weighted_change(shape: Shape) -> None:
-    mass, before, after = fields(shape, 3)
+def test_weighted_sums(shape: Shape) -> None:
+    mass, first, before, after = fields(shape, 4)
     change = mass * (after - before)
-    expected = change.sum(), np.abs(change).sum()
-    assert weighted_change(mass, before, after) == pytest.approx(expected, rel=1e-12)
+    parts = mass * first, mass * before, mass * after, change, np.abs(change)
+    sums = [part.sum() for part in parts]
+    np.testing.assert_allclose(weighted_sums(mass, first, before, after), sums, rtol=1e-12)
 
 
 @SHAPES
 def test_largest_open(shape: Shape) -> None:
     field, opened = fields(shape, 2)
-    expected = np.abs(field).max(where=opened > 0.0, initial=0.0)
-    assert largest_open(field, opened) == expected
+    for part in (0.0, 0.5):
+        expected = np.abs(field).max(where=opened > part, initial=0.0)
+        assert largest_open(field, opened, part) == expected
     assert largest_size(field) == np.abs(field).max()

@@ -134,8 +134,10 @@ def volumes_of(world: World, cut: Geometry) -> ControlVolumes:
     fluid, state = world.flow()
     cells = cut.volume if moved_since(world) else state.cell_volume
     kept = world.volumes
-    if kept is not None and kept[0] is cut and np.array_equal(kept[1].cells, cells):
-        return kept[1]
+    if kept is not None and kept[0] is cut:
+        known = kept[1].cells
+        if known is cells or np.array_equal(known, cells):
+            return kept[1]
     return control_volumes(cells, cut.open, fluid.grid, fluid.boundaries)
 
 

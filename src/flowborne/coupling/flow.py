@@ -18,17 +18,18 @@ from flowborne.coupling.mouths import (
     inlets_across,
     taken_by,
 )
-from flowborne.coupling.operators import add_bodies, boundary_velocity
+from flowborne.coupling.operators import boundary_velocity, carried_at
 from flowborne.coupling.solve import SolvedFlow
 from flowborne.coupling.world import Fluid, World
 from flowborne.fluid.boundary import cells_in
 from flowborne.fluid.control_volumes import ControlVolumes, control_volumes
 from flowborne.fluid.dye import Dyed, Passage, carry_dye
 from flowborne.fluid.ghosts import edge, impose_sides
-from flowborne.fluid.grid import Grid, copied, faces_of
+from flowborne.fluid.grid import copied, faces_of
 from flowborne.fluid.projection import accelerated
 from flowborne.fluid.transport import Transport, carry_component, damp_eddies
 from flowborne.kernels.arrays import PRESCRIBED, Array, Faces
+from flowborne.kernels.control_volumes import stride
 from flowborne.kernels.faces import changes_of_step, still_to_come
 from flowborne.solids.dynamics import Kinematics
 
@@ -65,13 +66,13 @@ def advect(
 ) -> tuple[AdvectionResult, Dyed]:
     """Velocity and scalars a step later; `velocity` (Faces, m/s) is that at the start."""
     fluid, state = world.flow()
-    dyed = Dyed({}, 0.0)
+    carried, dyed = advect_momentum(start, velocity, transport), Dyed({}, 0.0)
     if state.scalars:
         inflow = brought_by(start.jets, start.rate, tuple(state.scalars))
         backwards = world.steps % 2 == 1
         passage = Passage(transport, inflow, fluid.grid, fluid.boundaries, backwards)
         dyed = carry_dye(state.scalars, passage, fluid.sources)
-    return advect_momentum(start, velocity, transport), dyed
+    return carried, dyed
 
 
 def advect_momentum(start: Departure, velocity: Faces, transport: Transport) -> AdvectionResult:
@@ -88,8 +89,10 @@ def advect_momentum(start: Departure, velocity: Faces, transport: Transport) -> 
     cells = cells_with_inlets(jets, start.sources, fluid.sources, grid)
     for axis in grid.axes:
         inlets = inlets_across(axis, cells, jets, start.sources, grid, sides)
-        along = np.empty(velocity[axis].shape)
-        still_to_come(along, state.acceleration[axis], velocity[axis], state.velocity[axis], dt)
+        along, was = state.acceleration[axis], state.velocity[axis]
+        if velocity[axis] is not was:
+            along = np.empty(was.shape)
+            still_to_come(along, state.acceleration[axis], velocity[axis], was, dt)
         carried = carry_component(velocity[axis], along, axis, transport, inlets, grid, sides)
         arrived.insert(axis, carried.velocity)
         crossed[axis] = fluid.density * carried.crossed
@@ -162,7 +165,7 @@ def store_state(
     grid, sides, volumes = fluid.grid, fluid.boundaries, advected.volumes
     dt, velocity = solved.driven.system.dt, solved.velocity
     world.solid.v[:], world.volumes = solved.v, (cut, volumes)
-    fill_with_leak_proof(velocity, volumes, cut, boundary_velocity(pose, solved.v), grid)
+    fill_with_leak_proof(velocity, volumes, cut, boundary_velocity(pose, solved.v), fluid)
     volumes.follow(velocity, grid)
     for axis in grid.axes:
         change, acceleration = state.velocity[axis], state.acceleration[axis]
@@ -182,17 +185,18 @@ def store_state(
 
 
 def fill_with_leak_proof(
-    velocity: Faces, volumes: ControlVolumes, cut: Geometry, moving: Array, grid: Grid
+    velocity: Faces, volumes: ControlVolumes, cut: Geometry, moving: Array, fluid: Fluid
 ) -> None:
     """Give faces that no fluid moves with the velocity of the leak-proof field, in place.
 
     moving  (k,) see `operators.leak_proof`
     """
+    grid, sides = fluid.grid, fluid.boundaries
     for axis in grid.axes:
-        u, held = velocity[axis].reshape(-1), volumes.moving[axis].reshape(-1)
-        faces = cut.closed.face[cut.closed.axis == axis]
-        open_ones, empty = faces[held[faces] != 0.0], np.flatnonzero(held == 0.0)
-        kept = u[open_ones]
-        u[empty] *= cut.open[axis].reshape(-1)[empty]
-        add_bodies(velocity[axis], axis, cut, moving)
-        u[open_ones] = kept
+        faces = np.concatenate([volumes.cut[axis], volumes.closed[axis].faces])
+        if sides.periodic()[axis]:  # the last ones are the first ones
+            shape = grid.face_shape(axis)
+            first = faces[np.unravel_index(faces, shape)[axis] == 0]
+            faces = np.append(faces, first + grid.shape[axis] * stride(shape, axis))
+        empty = faces[volumes.moving[axis].reshape(-1)[faces] == 0.0]
+        velocity[axis].reshape(-1)[empty] = carried_at(empty, axis, velocity, cut, moving)

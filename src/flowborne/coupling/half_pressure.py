@@ -57,14 +57,15 @@ def explicit_half_pressure(world: World, start: Departure, dt: float) -> HalfPre
     """
     fluid, state = world.flow()
     grid, sides, opened = fluid.grid, fluid.boundaries, start.cut.open
-    mass = face_masses(start.volumes, fluid.density)
     momentum = np.full(3, np.nan)
     if world.setup.balances:
-        momentum = fluid_momentum(state.velocity, mass, grid, sides)
+        volumes = start.volumes.moving
+        momentum = fluid.density * fluid_momentum(state.velocity, volumes, grid, sides)
     size = 6 * world.setup.solid.nbody + start.cut.skins.vertices.size
     if sides.gain_energy(grid) or sea_changes(world, dt) or moved_since(world):
         still = np.zeros(grid.shape), np.zeros(size), np.zeros(3)
         return HalfPressure(state.velocity, *still, momentum)
+    mass = face_masses(start.volumes, fluid.density)
     gradient = pressure_gradient(opened, mass, fluid.density, grid, sides)
     last, earlier = grid.zeros_faces(), grid.zeros_faces()
     pressure = dynamic_pressure(state.pressure, fluid)

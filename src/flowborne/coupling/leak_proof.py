@@ -91,7 +91,7 @@ def leak_proof_flux(
     state, before, cells = departure.state, departure.cut, departure.volumes.cells
     fluid = departure.fluid
     grid, sides = fluid.grid, fluid.boundaries
-    flux, weights = grid.zeros_faces(), grid.zeros_faces()
+    flux, weights = grid.empty_faces(), grid.empty_faces()
     for axis in grid.axes:
         ends = before.open[axis], after.open[axis]
         moving = state.velocity[axis], state.velocity_change[axis]

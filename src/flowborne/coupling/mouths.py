@@ -31,7 +31,7 @@ from flowborne.fluid.grid import Grid
 from flowborne.fluid.sides.far import Strength
 from flowborne.fluid.transport import NO_INLETS
 from flowborne.kernels.arrays import Array, Integers, Mask
-from flowborne.kernels.carry import Inlets
+from flowborne.kernels.carry import Inlets, share_at_faces
 from flowborne.kernels.control_volumes import merged
 from flowborne.solids.dynamics import Kinematics
 
@@ -267,23 +267,11 @@ def after_drinking(jet: Jet, taken: Array, dt: float) -> Jet:
 
 def at_faces(
     cells: Integers, values: tuple[Array, ...], axis: int, grid: Grid, sides: Boundaries
-) -> tuple[Integers, list[Array]]:
+) -> tuple[Integers, Array]:
     """Half of what comes into each of some cells for both of its faces across `axis`: the faces,
     flat and ascending, and the sums on them. The last face along a periodic axis is the first."""
-    at = np.stack(np.unravel_index(cells, grid.shape))
-    above = at.copy()
-    above[axis] += 1
-    if sides.periodic()[axis]:
-        above[axis] %= grid.shape[axis]
-    shape = grid.face_shape(axis)
-    both = [np.ravel_multi_index(tuple(place), shape) for place in (at, above)]
-    lower, upper = both
-    order = np.argsort(upper, kind="stable")  # on a periodic axis the last ones come first
-    index, first, second = merged(lower, upper[order])
-    which = np.concatenate([first, np.empty_like(second)])
-    which[cells.size + order] = second
-    sums = [np.bincount(which, np.tile(v, 2), index.size) for v in values]
-    return index, [np.asarray(0.5 * total, float) for total in sums]
+    ring = grid.shape[axis] * sides.periodic()[axis]
+    return share_at_faces(cells, values, axis, grid.shape, ring)
 
 
 def brought_by(jets: tuple[Jet, ...], rate: Array, names: tuple[str, ...]) -> Brought:

@@ -15,7 +15,7 @@ from flowborne.coupling.fractions import Geometry
 from flowborne.fluid.dipoles import Dipoles
 from flowborne.fluid.grid import Grid, faces_of
 from flowborne.fluid.projection import PressureGradient
-from flowborne.kernels.arrays import FREE, Array, DenseTerm, Faces
+from flowborne.kernels.arrays import FREE, Array, DenseTerm, Faces, Integers
 from flowborne.kernels.coupling_rows import add_body_velocity
 from flowborne.kernels.sparse_rows import add_rows, sum_rows
 from flowborne.solids.dynamics import Kinematics
@@ -63,6 +63,17 @@ def carried(axis: int, velocity: Faces, geometry: Geometry, moving: Array) -> Ar
     field = geometry.open[axis] * velocity[axis]
     add_bodies(field, axis, geometry, moving)
     return field
+
+
+def carried_at(
+    faces: Integers, axis: int, velocity: Faces, geometry: Geometry, moving: Array
+) -> Array:
+    """(n,) the same on some of the faces across an axis, flat."""
+    field = np.empty(velocity[axis].shape)  # only what is asked for has a meaning
+    flat, opened = field.reshape(-1), geometry.open[axis].reshape(-1)
+    flat[faces] = opened[faces] * velocity[axis].reshape(-1)[faces]
+    add_bodies(field, axis, geometry, moving)
+    return flat[faces]
 
 
 def add_bodies(out: Array, axis: int, geometry: Geometry, moving: Array) -> None:

@@ -31,7 +31,7 @@ from flowborne.coupling.operators import (
     add_flux,
     beyond_sides,
     boundary_velocity,
-    carried,
+    carried_at,
     generalised,
     pressure_push,
     side_push,
@@ -227,7 +227,7 @@ def solve_together(
     if world.setup.balances:
         moved = start + term.mobility.times(on_solids)
         divergence = largest_divergence(after, cut, moved, rate, fluid)
-        fastest = max(largest_open(after[axis], cut.open[axis]) for axis in fluid.grid.axes)
+        fastest = max(largest_open(after[axis], cut.open[axis], 0.0) for axis in fluid.grid.axes)
     else:
         added_mass = np.full(change.size, np.nan)
     if world.setup.splits:
@@ -324,5 +324,9 @@ def rounding_floor(velocity: Faces, cut: Geometry, moving: Array, grid: Grid) ->
 
     Of fluid and bodies in motion (k,): a body that turns displaces less than its faces move.
     """
-    fastest = max(largest_size(carried(axis, velocity, cut, moving)) for axis in grid.axes)
+    fastest = 0.0
+    for axis in grid.axes:
+        faces = cut.closed.face[cut.closed.axis == axis]
+        met = np.abs(carried_at(faces, axis, velocity, cut, moving)).max(initial=0.0)
+        fastest = max(fastest, met, largest_open(velocity[axis], cut.open[axis], 1.0 - ROUNDING))
     return float(ROUNDING * grid.face_area * fastest * np.sqrt(np.prod(grid.shape)))

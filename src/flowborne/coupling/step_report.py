@@ -16,7 +16,7 @@ from flowborne.coupling.report import FIELDS, Asked, Outcome, StepReport
 from flowborne.coupling.solve import Solved, SolvedFlow
 from flowborne.coupling.stream import winds_on
 from flowborne.coupling.world import World
-from flowborne.fluid.control_volumes import fluid_momentum, momentum_change
+from flowborne.fluid.control_volumes import momentum_changes
 from flowborne.kernels.arrays import Array, Faces
 from flowborne.solids.dynamics import Kinematics
 from flowborne.solids.flesh import Flesh
@@ -149,16 +149,16 @@ def momentum_budget(
     fluid, _ = world.flow()
     before, grid, boundaries = solved.before_pressure, fluid.grid, fluid.boundaries
     first = 6 * world.setup.solid.nbody
-    pressed = fluid_momentum(before, mass, grid, boundaries)
-    taken, moved = momentum_change(before, solved.velocity, mass, grid, boundaries)
-    after = fluid_momentum(solved.velocity, mass, grid, boundaries)
+    fields = advected.velocity, before, solved.velocity
+    sums = momentum_changes(fields, mass, grid, boundaries)
+    carried, pressed, after, taken, moved = sums
     pushes = linear(solved.impulse, first)
     exchanged = pushes.sum(axis=0)
-    scale = float(np.abs(pushes).sum()) + moved
+    scale = float(np.abs(pushes).sum() + moved.sum())
     missing = float(np.abs(exchanged + taken - solved.sides).max())
     sides = solved.sides + half.sides
     exchanged += linear(half.impulse, first).sum(axis=0)
-    forces = pressed - fluid_momentum(advected.velocity, mass, grid, boundaries)
+    forces = pressed - carried
     given = advected.crossed + advected.expelled + advected.stopped + forces + sides - exchanged
     unknown = float(np.abs(after - half.start - given).max())
     return {

@@ -24,7 +24,7 @@ from flowborne.fluid.grid import Grid, faces_of, inner_product
 from flowborne.kernels.arrays import Array, Faces, Integers
 from flowborne.kernels.control_volumes import Closed, Transfers, share_velocity
 from flowborne.kernels.face_masses import find_moving
-from flowborne.kernels.faces import weighted_change
+from flowborne.kernels.faces import weighted_sums
 
 NOTHING = 1e-9
 """Part of a cell below which a control volume holds nothing."""
@@ -101,7 +101,7 @@ def each_once(axis: int, sides: Boundaries) -> tuple[int | slice, ...]:
 
 
 def fluid_momentum(velocity: Faces, mass: Faces, grid: Grid, sides: Boundaries) -> Array:
-    """(3,) linear momentum of the fluid, N s."""
+    """(3,) linear momentum of the fluid, N s; over the density if volumes are given for masses."""
     total = np.zeros(3)
     for axis in grid.axes:
         own = each_once(axis, sides)
@@ -109,18 +109,18 @@ def fluid_momentum(velocity: Faces, mass: Faces, grid: Grid, sides: Boundaries) 
     return total
 
 
-def momentum_change(
-    before: Faces, after: Faces, mass: Faces, grid: Grid, sides: Boundaries
-) -> tuple[Array, float]:
-    """(3,) what linear momentum changes by between two velocities, and the sum of its parts' sizes,
-    N s."""
-    total, size = np.zeros(3), 0.0
+def momentum_changes(
+    fields: tuple[Faces, Faces, Faces], mass: Faces, grid: Grid, sides: Boundaries
+) -> Array:
+    """(5, 3) linear momentum with each of three velocities, what it changes by from the second to
+    the third, and the sum of its parts' sizes, N s."""
+    sums = np.zeros((5, 3))
     for axis in grid.axes:
         own = each_once(axis, sides)
-        fields = (np.ascontiguousarray(f[axis][own]) for f in (mass, before, after))
-        total[axis], change = weighted_change(*fields)
-        size += change
-    return total, size
+        sums[:, axis] = weighted_sums(
+            *(np.ascontiguousarray(f[axis][own]) for f in (mass, *fields))
+        )
+    return sums
 
 
 def kinetic_energy(velocity: Faces, mass: Faces, grid: Grid, sides: Boundaries) -> float:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from flowborne.fluid.boundary import Boundaries, Source, cells_in
 from flowborne.fluid.control_volumes import WHOLE as UNCUT
 from flowborne.fluid.ghosts import Scalar, edge
-from flowborne.fluid.grid import Grid, faces_of, inner_product
+from flowborne.fluid.grid import Grid, inner_product
 from flowborne.fluid.sides.side import Place
 from flowborne.fluid.transport import SUBSTEPS, Transport, parts_for
 from flowborne.kernels.arrays import Array, Integers, Marks
@@ -83,6 +83,8 @@ def carry_dye(scalars: dict[str, Array], passage: Passage, sources: tuple[Source
 class Passage:
     """What carries dye through a step, the same for every scalar.
 
+    It takes what flows through faces of cut cells out of the transport's fluxes, into a list.
+
     backwards  whether the last axis comes first; to be turned about from step to step
     """
 
@@ -91,26 +93,24 @@ class Passage:
     ) -> None:
         self.transport, self.brought, self.backwards = transport, brought, backwards
         self.grid, self.sides = grid, sides
-        start, end = transport.before.cells, transport.after.cells
-        filled, uncut = np.abs(brought.rate), UNCUT * grid.cell_volume
-        filled.reshape(-1)[brought.cells] += brought.gain
-        kind, fullest = sort_cells(start, end, filled, transport.flux, uncut)
+        start, end, uncut = transport.before.cells, transport.after.cells, UNCUT * grid.cell_volume
+        kind, fullest = sort_cells(start, end, brought.rate, transport.flux, uncut)
+        kind.reshape(-1)[brought.cells] = CUT
         flowing = transport.dt * float(fullest.max())
         self.count = parts_for(min(flowing, SUBSTEPS))
         self.dt = transport.dt / self.count
         others = np.flatnonzero(kind != WHOLE)
-        shape, wraps = np.array(grid.shape), np.array(grid.shape) * np.array(sides.periodic())
+        x, y, z = (n * ring for n, ring in zip(grid.shape, sides.periodic(), strict=True))
+        shape, wraps = grid.shape, (x, y, z)
         self.clear: Marks = np.ones(grid.shape, np.uint8)
         mark_cut(self.clear, others, shape, wraps, REACH)
-        self.flux, listed = transport.flux, others[kind.reshape(-1)[others] == CUT]
+        listed = others[kind.reshape(-1)[others] == CUT]
         self.given: dict[tuple[str, int, int], Array | None] = {}
         n = listed.size
         tables = np.full((n, 6), -1), np.full((n, 6), -1), np.zeros((n, 6))
         self.cut = CutCells(listed, *tables)
-        if n:
-            self.flux = faces_of([q.copy() for q in transport.flux])
-            for axis in grid.axes:
-                list_flows(self.cut, axis, self.flux[axis], wraps, shape)
+        for axis in grid.axes if n else ():
+            list_flows(self.cut, axis, transport.flux[axis], wraps, shape)
         self.expelled = np.searchsorted(listed, brought.cells)
 
     def carry(self, name: str, values: Array, bounds: tuple[float, float]) -> tuple[Array, float]:
@@ -130,7 +130,7 @@ class Passage:
                 crossed = sweep(
                     along(field, axis, self.grid),
                     along(volume, axis, self.grid),
-                    along(self.flux[axis], axis, self.grid),
+                    along(self.transport.flux[axis], axis, self.grid),
                     along(self.clear, axis, self.grid),
                     ends,
                     self.sides.periodic()[axis],

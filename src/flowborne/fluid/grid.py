@@ -102,6 +102,12 @@ class Grid:
         """Zero on every face."""
         return faces_of([np.zeros(self.face_shape(axis)) for axis in range(3)])
 
+    def empty_faces(self) -> Faces:
+        """Unknown on every face, to be filled; 0 across a slab."""
+        return faces_of(
+            [(np.empty if a in self.axes else np.zeros)(self.face_shape(a)) for a in range(3)]
+        )
+
     def cell_coordinates(self) -> tuple[Array, Array, Array]:
         """x (nx,), y (ny,), z (nz,) of the cell centres in m."""
         return self._coordinates((0.5, 0.5, 0.5), self.shape)

@@ -32,7 +32,7 @@ def accelerated(opened: Faces, mass: Faces, grid: Grid, boundaries: Boundaries) 
 
     mass  of each face, kg; 0 where no pressure acts
     """
-    rates = grid.zeros_faces()
+    rates = grid.empty_faces()
     for axis in grid.axes:
         accelerate(rates[axis], opened[axis], mass[axis], grid.face_area)
     for place, side in boundaries.around(grid):
@@ -42,7 +42,7 @@ def accelerated(opened: Faces, mass: Faces, grid: Grid, boundaries: Boundaries) 
 
 def face_weights(opened: Faces, rate: Faces, grid: Grid) -> Faces:
     """Weights w = a A rate of the pressure matrix, of a A / m; see the module."""
-    weights = grid.zeros_faces()
+    weights = grid.empty_faces()
     for axis in grid.axes:
         weigh(weights[axis], opened[axis], rate[axis], grid.face_area)
     return weights

@@ -30,9 +30,11 @@ from flowborne.kernels.control_volumes import (
     join_small,
     level,
     mark_cut,
+    merged,
     share_velocity,
     stride,
 )
+from flowborne.kernels.dye import face_of
 from flowborne.kernels.face_masses import add_transfers, give, place_of
 from flowborne.kernels.faces import flat
 from flowborne.kernels.flux import (
@@ -106,6 +108,36 @@ class Inlets(NamedTuple):
     gain: Array
     velocity: Array
     loss: Array
+
+
+@njit(nogil=True, cache=True)
+def share_at_faces(
+    cells: Integers, values: tuple[Array, ...], axis: int, shape: Three, ring: int
+) -> tuple[Integers, Array]:
+    """Half of what comes into each of some cells for both of its faces across an axis: the faces,
+    flat and ascending, and (m, n) the sums on them.
+
+    cells   (k,) flat, ascending
+    values  m of (k,)
+    shape   of the cells
+    ring    how many there are along a periodic axis, whose last faces are the first ones; else 0
+    """
+    both, step, wrapped = np.empty((2, cells.size), np.int64), stride(shape, axis), 0
+    plain, around = np.empty(cells.size, np.int64), np.empty(cells.size, np.int64)
+    for n in range(cells.size):
+        both[0, n] = face_of(shape, axis, cells[n], 0)
+        both[1, n] = plain[n - wrapped] = both[0, n] + step
+        if ring > 0 and indices(shape, cells[n])[axis] == ring - 1:
+            both[1, n] = around[wrapped] = both[1, n] - ring * step
+            wrapped += 1
+    index = merged(merged(both[0], plain[: cells.size - wrapped])[0], around[:wrapped])[0]
+    sums, near = np.zeros((len(values), index.size)), 0
+    for faces in both:
+        for n in range(cells.size):
+            near = place_of(index, faces[n], near)
+            for m in range(len(values)):
+                sums[m, near] += 0.5 * values[m][n]
+    return index, sums
 
 
 class Exchange(NamedTuple):

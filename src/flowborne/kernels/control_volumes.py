@@ -385,7 +385,7 @@ def share_velocity(field: Array, closed: Closed) -> None:
 
 
 @njit(nogil=True, cache=True)
-def mark_cut(marks: Marks, listed: Integers, shape: Integers, wraps: Integers, reach: int) -> None:
+def mark_cut(marks: Marks, listed: Integers, shape: Three, wraps: Three, reach: int) -> None:
     """Set to 0 the marks, padded or not, of listed places of a field of this shape, and of those up
     to `reach` beyond them along each axis, in place."""
     n1, n2, flat = shape[1], shape[2], marks.reshape(-1)
@@ -456,6 +456,7 @@ def sort_faces(
         at = i if component == 0 else j
         volume, kind, part = volumes[i, j], kinds[i, j], opened[i, j]
         mean_row(volume, cells, i, j, component, periodic)
+        parts, shut, uneven = 0, 0, 0
         for end in range(3):  # the middle of the row first, then both of its ends
             start, stop = 0, n2
             if end > 0:
@@ -464,22 +465,27 @@ def sort_faces(
                 start = at = 0 if end == 1 else last
                 stop = start + 1
             elif component == 2:
-                at = 1
+                at, start, stop = 1, 1, last
             outer = at == 0 or at == last
             double = periodic and at == last
             own = not double and not (at == 0 and ends[0] == PRESCRIBED)
             own = own and not (at == last and ends[1] == PRESCRIBED)
             least = bound * (0.0 if double else (0.5 if outer and not periodic else 1.0))
             goal = cell * (0.5 if outer and not periodic else 1.0)
+            least, odd = least * cell, 0
+            held, opening, kind[start:stop] = volume[start:stop], part[start:stop], DRIVEN * own
+            for k in range(held.size):
+                whole = (opening[k] == 1.0) & (held[k] >= least) & (held[k] > nothing)
+                odd += not (whole & (abs(held[k] - goal) <= slack))
+            if odd == 0:
+                continue
             for k in range(start, stop):
-                kind[k] = kind_of(volume[k], part[k], least * cell, goal, slack, nothing, own)
+                kind[k] = kind_of(volume[k], part[k], least, goal, slack, nothing, own)
                 if own and volume[k] == 0.0 and cancels(cells, i, j, k, component):
                     kind[k] |= SHUT
-        parts, shut, uneven = 0, 0, 0
-        for k in range(n2):
-            parts += (kind[k] & PART) // PART
-            shut += (kind[k] & SHUT) // SHUT
-            uneven += (kind[k] & UNEVEN) // UNEVEN
+                parts += (kind[k] & PART) // PART
+                shut += (kind[k] & SHUT) // SHUT
+                uneven += (kind[k] & UNEVEN) // UNEVEN
         counts[row, 0], counts[row, 1], counts[row, 2] = parts, shut, uneven
 
 

@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit, prange
 
-from flowborne.kernels.arrays import ROUNDING, Array, Faces, Integers, Marks
+from flowborne.kernels.arrays import ROUNDING, Array, Faces, Integers, Marks, Three
 from flowborne.kernels.control_volumes import both_beside, indices, place_of, stride
 from flowborne.kernels.jit import inlined, kernel
 
@@ -236,7 +236,7 @@ class CutCells(NamedTuple):
 
 
 @njit(nogil=True, cache=True)
-def face_of(shape: Integers, axis: int, f: int, upper: int) -> int:
+def face_of(shape: Three | Integers, axis: int, f: int, upper: int) -> int:
     """Flat index of the lower or upper face of cell f among the faces across an axis."""
     i, j, _ = indices(shape, f)
     before = 0 if axis == 0 else (i if axis == 1 else i * shape[1] + j)
@@ -244,7 +244,7 @@ def face_of(shape: Integers, axis: int, f: int, upper: int) -> int:
 
 
 @njit(nogil=True, cache=True)
-def list_flows(cells: CutCells, axis: int, flux: Array, wraps: Integers, shape: Integers) -> None:
+def list_flows(cells: CutCells, axis: int, flux: Array, wraps: Three, shape: Three) -> None:
     """Take the faces of cut cells across an axis out of the fluxes, and write what is beside and
     leaves there.
 
@@ -252,8 +252,7 @@ def list_flows(cells: CutCells, axis: int, flux: Array, wraps: Integers, shape: 
     wraps  (3,) number of cells along each periodic axis, else 0
     shape  (3,) of the cells
     """
-    (listed, beside, row, out), through = cells, flux.reshape(-1)
-    near = np.zeros(2, np.int64)
+    (listed, beside, row, out), through, near = cells, flux.reshape(-1), np.zeros(2, np.int64)
     step, count, ring = stride(shape, axis), shape[axis], wraps[axis]
     for n in range(listed.size):
         at, first = indices(shape, listed[n])[axis], face_of(shape, axis, listed[n], 0)

@@ -25,6 +25,7 @@ import numpy as np
 from numba import njit
 
 from flowborne.kernels.arrays import Array, Indices, Integers
+from flowborne.kernels.control_volumes import indices, stride
 
 
 @njit(nogil=True, cache=True)
@@ -62,7 +63,8 @@ def list_edges(
         n1 = shape[1] - int(axis != 1 and across != 1)
         n2 = shape[2] - int(axis != 2 and across != 2)
         for f in cut[m]:
-            i, j, k = f // (n1 * n2) + reach, (f // n2) % n1 + reach, f % n2 + reach
+            i, j, k = indices((shape[0], n1, n2), f)
+            i, j, k = i + reach, j + reach, k + reach
             for _ in range(2):
                 for way in range(3):
                     for shift in range(-reach, reach + 1):
@@ -92,35 +94,38 @@ def edges_near(
     volumes  that move with the faces across the next two axes, 0 at closed ones
     """
     listed, kept = list_edges(number, cut, axis, wraps, reach), 0
-    one, other, marks = (axis + 1) % 3, (axis + 2) % 3, number.reshape(-1)
+    one, other, marks, shape = (axis + 1) % 3, (axis + 2) % 3, number.reshape(-1), number.shape
     faces, beside = np.empty((listed.size, 4), np.int64), np.empty((listed.size, 4), np.int64)
-    least, n1, n2 = np.empty(listed.size), number.shape[1], number.shape[2]
-    for e in listed:
-        at, smallest = (e // (n1 * n2), (e // n2) % n1, e % n2), np.inf
-        for m in range(2):
-            volume, along = volumes[m], other if m == 0 else one
-            f1, f2 = volume.shape[1], volume.shape[2]
-            stride = f1 * f2 if along == 0 else (f2 if along == 1 else 1)
-            above = (at[0] * f1 + at[1]) * f2 + at[2]
-            below = above + stride * ((wraps[along] if at[along] == 0 else 0) - 1)
-            faces[kept, 2 * m], faces[kept, 2 * m + 1] = below, above
-            held = volume.reshape(-1)
-            smallest = min(smallest, held[below], held[above])
+    least = np.full(listed.size, np.inf)
+    for m in range(2):
+        along, held = other if m == 0 else one, volumes[m].reshape(-1)
+        wide, ring = volumes[m].shape, wraps[along]
+        step = stride(wide, along)
+        for n in range(listed.size):
+            at = indices(shape, listed[n])
+            above = (at[0] * wide[1] + at[1]) * wide[2] + at[2]
+            below = above + step * ((ring if at[along] == 0 else 0) - 1)
+            faces[n, 2 * m], faces[n, 2 * m + 1] = below, above
+            least[n] = min(least[n], held[below], held[above])
+    for n in range(listed.size):
+        e = listed[n]
         marks[e] = 0
-        if smallest > 0.0:
-            listed[kept], least[kept] = e, smallest
+        if least[n] > 0.0:
+            listed[kept], least[kept] = e, least[n]
+            for side in range(4):
+                faces[kept, side] = faces[n, side]
             kept += 1
             marks[e] = kept
-    for n in range(kept):
-        e = listed[n]
-        at = (e // (n1 * n2), (e // n2) % n1, e % n2)
-        for m in range(2):
-            a = one if m == 0 else other
-            stride = n1 * n2 if a == 0 else (n2 if a == 1 else 1)
-            down = (wraps[a] if at[a] == 0 else 0) - 1
-            up = 1 - (wraps[a] if at[a] == wraps[a] - 1 else 0)
-            beside[n, 2 * m] = marks[e + down * stride] - 1
-            beside[n, 2 * m + 1] = marks[e + up * stride] - 1
+    for m in range(2):
+        a = one if m == 0 else other
+        step, ring = stride(shape, a), wraps[a]
+        for n in range(kept):
+            e = listed[n]
+            place = indices(shape, e)[a]
+            down = (ring if place == 0 else 0) - 1
+            up = 1 - (ring if place == ring - 1 else 0)
+            beside[n, 2 * m] = marks[e + down * step] - 1
+            beside[n, 2 * m + 1] = marks[e + up * step] - 1
     return faces[:kept], beside[:kept], least[:kept]
 
 

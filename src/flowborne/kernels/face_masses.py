@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from flowborne.kernels.arrays import Array, FaceGrid, Faces, Integers, Marks
+from flowborne.kernels.arrays import Array, FaceGrid, Faces, Integers, Marks, Three
 from flowborne.kernels.control_volumes import (
     DRIVEN,
     LISTED,
@@ -75,12 +75,12 @@ def cell_beside(at: tuple[int, int, int], upper: int, faces: FaceGrid) -> int:
 
 @inlined
 def face_between(
-    at: tuple[int, int, int], way: int, low: int, faces: FaceGrid, across: Integers
+    at: tuple[int, int, int], way: int, low: int, faces: FaceGrid, across: Three
 ) -> int:
     """Flat index of one of the two faces between the control volume at (i, j, k) and the one beside
     it along another axis: that at the lower (0) or upper (1) of its cells; -1 beyond the domain.
 
-    across  (3,) shape of the faces across that axis
+    across  shape of the faces across that axis
     """
     component, shape, wraps = faces
     axis, up = way // 2, way % 2
@@ -118,7 +118,7 @@ def openings(
     above, way, rest = np.empty(listed.size, np.int64), np.zeros(listed.size), np.zeros(listed.size)
     across, room = across_axis(opened, axis), cells.reshape(-1)
     own, sides = across_axis(opened, faces.component).reshape(-1), across.reshape(-1)
-    wide, kind, near = np.array(across.shape), kinds.reshape(-1), 0
+    wide, kind, near = across.shape, kinds.reshape(-1), 0
     step, count, ring = stride(faces.shape, axis), faces.shape[axis], faces.wraps[axis]
     for n in range(listed.size):
         f, above[n] = listed[n], -1

@@ -120,27 +120,31 @@ def still_to_come(out: Array, rate: Array, now: Array, was: Array, dt: float) ->
 
 
 @kernel
-def weighted_change(weight: Array, before: Array, after: Array) -> tuple[float, float]:
-    """Sum of weight x (after - before), and of its sizes."""
-    mass, one, other = flat(weight), flat(before), flat(after)
-    planes, parts = one.shape[0], np.zeros((2, one.shape[0]))
-    for i in prange(planes):
-        row, sizes = np.zeros(LANES), np.zeros(LANES)
-        for first in range(0, one.shape[1], LANES):
-            last = min(first + LANES, one.shape[1])
-            a, b, m = one[i, first:last], other[i, first:last], mass[i, first:last]
-            for k in range(last - first):
-                change = m[k] * (b[k] - a[k])
-                row[k] += change
+def weighted_sums(weight: Array, first: Array, before: Array, after: Array) -> Array:
+    """(5,) sums of weight x each of three fields, of weight x (after - before), and of the sizes of
+    that."""
+    mass, other, low, high = flat(weight), flat(first), flat(before), flat(after)
+    parts = np.zeros((mass.shape[0], 5))
+    for i in prange(mass.shape[0]):
+        rows = np.zeros((5, LANES))
+        ones, lows, highs, changes, sizes = rows[0], rows[1], rows[2], rows[3], rows[4]
+        for at in range(0, mass.shape[1], LANES):
+            lane = slice(at, min(at + LANES, mass.shape[1]))
+            m, a, b, c = mass[i, lane], other[i, lane], low[i, lane], high[i, lane]
+            for k in range(m.size):
+                change = m[k] * (c[k] - b[k])
+                ones[k] += m[k] * a[k]
+                lows[k] += m[k] * b[k]
+                highs[k] += m[k] * c[k]
+                changes[k] += change
                 sizes[k] += abs(change)
-        for k in range(LANES):
-            parts[0, i] += row[k]
-            parts[1, i] += sizes[k]
-    total, size = 0.0, 0.0
-    for i in range(planes):
-        total += parts[0, i]
-        size += parts[1, i]
-    return total, size
+        for n in range(5):
+            for k in range(LANES):
+                parts[i, n] += rows[n, k]
+    total = np.zeros(5)
+    for i in range(mass.shape[0]):
+        total += parts[i]
+    return total
 
 
 @kernel
@@ -157,13 +161,13 @@ def largest_size(field: Array) -> float:
 
 
 @kernel
-def largest_open(field: Array, opened: Array) -> float:
-    """Largest size of a field on faces that are not wholly closed."""
+def largest_open(field: Array, opened: Array, more_than: float) -> float:
+    """Largest size of a field on faces of which more than a part is open."""
     values, part, most = flat(field), flat(opened), np.zeros(field.shape[0])
     for i in prange(values.shape[0]):
         found = 0.0
         for k in range(values.shape[1]):
-            size = abs(values[i, k]) if part[i, k] > 0.0 else 0.0
+            size = abs(values[i, k]) if part[i, k] > more_than else 0.0
             found = size if size > found else found
         most[i] = found
     return float(most.max())
