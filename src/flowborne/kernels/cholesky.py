@@ -227,35 +227,38 @@ def backwards(x: Array, begin: int, end: int, shared: Indices, block: Array, wor
 
 
 @kernel
-def respond(load: Array, mobility: MobilityArrays) -> Array:
-    """(k,) A^-1 load."""
+def respond(loads: Array, mobility: MobilityArrays) -> Array:
+    """(n, k) A^-1 on every row of loads (n, k)."""
     dense, t_start, t_column, t_value, value, blocks, order, taken = mobility
-    size = load.size
-    motion = np.zeros(size)
+    count, size = loads.shape
+    motions = np.zeros((count, size))
     if t_start.size == 1:
+        for n in range(count):
+            for a in range(size):
+                for b in range(size):
+                    motions[n, a] += dense[a, b] * loads[n, b]
+        return motions
+    forces, turned = np.zeros((count, order.size)), np.empty((count, order.size))
+    for n in range(count):
         for a in range(size):
-            for b in range(size):
-                motion[a] += dense[a, b] * load[b]
-        return motion
-    force = np.zeros(order.size)
-    for a in range(size):
-        if load[a] != 0.0:
-            for e in range(t_start[a], t_start[a + 1]):
-                force[t_column[e]] += t_value[e] * load[a]
-    turned = np.empty((1, order.size))
-    for i in range(order.size):
-        turned[0, order[i]] = force[i]
+            if loads[n, a] != 0.0:
+                for e in range(t_start[a], t_start[a + 1]):
+                    forces[n, t_column[e]] += t_value[e] * loads[n, a]
+        for i in range(order.size):
+            turned[n, order[i]] = forces[n, i]
     solve_factored(turned, value, blocks)
     answer = np.empty(order.size)
-    for i in range(order.size):
-        answer[i] = turned[0, order[i]]
-    for c in range(taken.shape[1]):
-        part = 0.0
+    for n in range(count):
+        force, motion = forces[n], motions[n]
         for i in range(order.size):
-            part += taken[i, c] * force[i]
-        for i in range(order.size):
-            answer[i] -= part * taken[i, c]
-    for a in range(size):
-        for e in range(t_start[a], t_start[a + 1]):
-            motion[a] += t_value[e] * answer[t_column[e]]
-    return motion
+            answer[i] = turned[n, order[i]]
+        for c in range(taken.shape[1]):
+            part = 0.0
+            for i in range(order.size):
+                part += taken[i, c] * force[i]
+            for i in range(order.size):
+                answer[i] -= part * taken[i, c]
+        for a in range(size):
+            for e in range(t_start[a], t_start[a + 1]):
+                motion[a] += t_value[e] * answer[t_column[e]]
+    return motions
