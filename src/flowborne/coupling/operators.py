@@ -40,11 +40,12 @@ def boundary_velocity(kinematics: Kinematics, v: Array) -> Array:
 
 def generalised(kinematics: Kinematics, push: Array) -> Array:
     """(nv,) generalised force of a push (k,): wrench on every body, then force on every vertex."""
-    bodies = kinematics.twist_jacobian.shape[0]
-    on_bones = np.einsum("bwv,bw->v", kinematics.twist_jacobian, push[: 6 * bodies].reshape(-1, 6))
     if kinematics.vertices.size == 0:
-        return np.asarray(on_bones)
-    return np.asarray(on_bones + kinematics.vertex_jacobian.T @ push[6 * bodies :])
+        wrenches = push.reshape(-1, 6)
+        return np.asarray(np.einsum("bwv,bw->v", kinematics.twist_jacobian, wrenches))
+    first = push.size - kinematics.vertices.size
+    on_bones = kinematics.bone_jacobian.T @ push[:first]
+    return np.asarray(on_bones + kinematics.vertex_jacobian.T @ push[first:])
 
 
 def leak_proof(velocity: Faces, geometry: Geometry, moving: Array, grid: Grid) -> Faces:

@@ -290,12 +290,14 @@ def give_way(cut: Geometry, mobility: Mobility, grid: Grid) -> Array:
     if mobility.is_dense:
         return NO_REACTION
     random, cells = np.random.default_rng(0), cut.rows[0]
-    room = np.zeros(grid.shape)
-    for _ in range(PROBES):
-        signs, moved = np.zeros(grid.shape), np.zeros(grid.shape)
-        signs.flat[cells] = 2.0 * random.integers(0, 2, cells.size) - 1.0
-        add_flux(moved, cut, mobility.times(pressure_push(cut, signs, mobility.size)))
-        room.flat[cells] += signs.flat[cells] * moved.flat[cells] / PROBES
+    signs, room = np.zeros((PROBES, *grid.shape)), np.zeros(grid.shape)
+    for field in signs:
+        field.flat[cells] = 2.0 * random.integers(0, 2, cells.size) - 1.0
+    motions = mobility.times(np.stack([pressure_push(cut, f, mobility.size) for f in signs]))
+    for field, motion in zip(signs, motions, strict=True):
+        moved = np.zeros(grid.shape)
+        add_flux(moved, cut, motion)
+        room.flat[cells] += field.flat[cells] * moved.flat[cells] / PROBES
     room.flat[cells] = np.maximum(room.flat[cells], 0.0)
     return room
 

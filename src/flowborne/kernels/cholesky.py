@@ -119,25 +119,34 @@ def give_update(value: Array, blocks: Blocks, s: int, update: Array, where: Indi
     """Take the update of block s from the columns that its rows are."""
     first, below, rows, at, owner = blocks
     shared = rows[below[s] : below[s + 1]]
-    m, target, begin, end, w, height, inner = shared.size, -1, 0, 0, 0, 0, 0
-    for i in range(m):
-        c = shared[i]
-        if owner[c] != target:
-            target = owner[c]
-            begin, end = first[target], first[target + 1]
-            w, height, inner = end - begin, below[target + 1] - below[target], i
-            for k in range(height):
-                where[rows[below[target] + k]] = k
-            while inner < m and shared[inner] < end:
-                inner += 1
-        mine = update[i * m : (i + 1) * m]
-        own = value[at[target] + (c - begin) * w : at[target] + (c - begin + 1) * w]
-        start = at[target] + w * w + (c - begin) * height
-        lower = value[start : start + height]
-        for j in range(i, inner):
-            own[shared[j] - begin] -= mine[j]
-        for j in range(inner, m):
-            lower[where[shared[j]]] -= mine[j]
+    m, i = shared.size, 0
+    while i < m:
+        target, inner = owner[shared[i]], i
+        begin, end = first[target], first[target + 1]
+        w, height = end - begin, below[target + 1] - below[target]
+        for k in range(height):
+            where[rows[below[target] + k]] = k
+        while inner < m and shared[inner] < end:
+            inner += 1
+        place = np.empty(m - inner, np.uint32)
+        for j in range(m - inner):
+            place[j] = where[shared[inner + j]]
+        together = place.size > 0 and place[-1] - place[0] == place.size - 1
+        for row in range(i, inner):
+            c, mine = shared[row] - begin, update[row * m : (row + 1) * m]
+            own = value[at[target] + c * w : at[target] + (c + 1) * w]
+            start = at[target] + w * w + c * height
+            lower, taken = value[start : start + height], mine[inner:]
+            for j in range(row, inner):
+                own[shared[j] - begin] -= mine[j]
+            if together:
+                across = lower[place[0] : place[0] + taken.size]
+                for j in range(taken.size):
+                    across[j] -= taken[j]
+            else:
+                for j in range(taken.size):
+                    lower[place[j]] -= taken[j]
+        i = inner
 
 
 @kernel
@@ -162,72 +171,94 @@ def solve_factored(x: Array, value: Array, blocks: Blocks) -> None:
 def forwards(x: Array, begin: int, end: int, shared: Indices, block: Array, work: Array) -> None:
     """L y = x for the columns of one block begin..end, and what they take from the others."""
     w, m = end - begin, shared.size
-    here, part = x[begin:end], work[:m]
-    part[:] = 0.0
+    here, part, panel = x[begin:end], work[:m], block[w * w :]
+    used = False
     for c in range(w):
-        own, lower = block[c * w : (c + 1) * w], block[w * w + c * m : w * w + (c + 1) * m]
+        used |= here[c] != 0.0
+    if not used:
+        return
+    for c in range(w):
+        own = block[c * w : (c + 1) * w]
         here[c] /= own[c]
         for r in range(c + 1, w):
             here[r] -= own[r] * here[c]
+    part[:] = 0.0
+    c = 0
+    while c + 3 < w:
+        p0, p1 = panel[c * m : (c + 1) * m], panel[(c + 1) * m : (c + 2) * m]
+        p2, p3 = panel[(c + 2) * m : (c + 3) * m], panel[(c + 3) * m : (c + 4) * m]
+        y0, y1, y2, y3 = here[c], here[c + 1], here[c + 2], here[c + 3]
         for k in range(m):
-            part[k] += lower[k] * here[c]
+            part[k] = (((part[k] + p0[k] * y0) + p1[k] * y1) + p2[k] * y2) + p3[k] * y3
+        c += 4
+    while c < w:
+        p0, y0 = panel[c * m : (c + 1) * m], here[c]
+        for k in range(m):
+            part[k] += p0[k] * y0
+        c += 1
     for k in range(m):
-        x[shared[k]] -= part[k]
+        x[np.uint32(shared[k])] -= part[k]
 
 
 @kernel
 def backwards(x: Array, begin: int, end: int, shared: Indices, block: Array, work: Array) -> None:
     """L^T y = x for the columns of one block begin..end, when the later ones are known."""
     w, m = end - begin, shared.size
-    here, part = x[begin:end], work[:m]
+    here, part, whole = x[begin:end], work[:m], m // 4 * 4
     for k in range(m):
-        part[k] = x[shared[k]]
-    for c in range(w - 1, -1, -1):
-        own, lower = block[c * w : (c + 1) * w], block[w * w + c * m : w * w + (c + 1) * m]
+        part[k] = x[np.uint32(shared[k])]
+    for c in range(w):
+        lower = block[w * w + c * m : w * w + (c + 1) * m]
         t0, t1, t2, t3 = 0.0, 0.0, 0.0, 0.0
-        for k in range(0, m - 3, 4):
+        for k in range(0, whole, 4):
             t0 += lower[k] * part[k]
             t1 += lower[k + 1] * part[k + 1]
             t2 += lower[k + 2] * part[k + 2]
             t3 += lower[k + 3] * part[k + 3]
-        for k in range(m - m % 4, m):
+        for k in range(whole, m):
             t0 += lower[k] * part[k]
-        total = here[c] - ((t0 + t1) + (t2 + t3))
+        here[c] -= (t0 + t1) + (t2 + t3)
+    for c in range(w - 1, -1, -1):
+        own = block[c * w : (c + 1) * w]
+        total = here[c]
         for r in range(c + 1, w):
             total -= own[r] * here[r]
         here[c] = total / own[c]
 
 
 @kernel
-def respond(load: Array, mobility: MobilityArrays) -> Array:
-    """(k,) A^-1 load."""
+def respond(loads: Array, mobility: MobilityArrays) -> Array:
+    """(n, k) A^-1 on every row of loads (n, k)."""
     dense, t_start, t_column, t_value, value, blocks, order, taken = mobility
-    size = load.size
-    motion = np.zeros(size)
+    count, size = loads.shape
+    motions = np.zeros((count, size))
     if t_start.size == 1:
+        for n in range(count):
+            for a in range(size):
+                for b in range(size):
+                    motions[n, a] += dense[a, b] * loads[n, b]
+        return motions
+    forces, turned = np.zeros((count, order.size)), np.empty((count, order.size))
+    for n in range(count):
         for a in range(size):
-            for b in range(size):
-                motion[a] += dense[a, b] * load[b]
-        return motion
-    force = np.zeros(order.size)
-    for a in range(size):
-        if load[a] != 0.0:
-            for e in range(t_start[a], t_start[a + 1]):
-                force[t_column[e]] += t_value[e] * load[a]
-    turned = np.empty((1, order.size))
-    for i in range(order.size):
-        turned[0, order[i]] = force[i]
+            if loads[n, a] != 0.0:
+                for e in range(t_start[a], t_start[a + 1]):
+                    forces[n, t_column[e]] += t_value[e] * loads[n, a]
+        for i in range(order.size):
+            turned[n, order[i]] = forces[n, i]
     solve_factored(turned, value, blocks)
     answer = np.empty(order.size)
-    for i in range(order.size):
-        answer[i] = turned[0, order[i]]
-    for c in range(taken.shape[1]):
-        part = 0.0
+    for n in range(count):
+        force, motion = forces[n], motions[n]
         for i in range(order.size):
-            part += taken[i, c] * force[i]
-        for i in range(order.size):
-            answer[i] -= part * taken[i, c]
-    for a in range(size):
-        for e in range(t_start[a], t_start[a + 1]):
-            motion[a] += t_value[e] * answer[t_column[e]]
-    return motion
+            answer[i] = turned[n, order[i]]
+        for c in range(taken.shape[1]):
+            part = 0.0
+            for i in range(order.size):
+                part += taken[i, c] * force[i]
+            for i in range(order.size):
+                answer[i] -= part * taken[i, c]
+        for a in range(size):
+            for e in range(t_start[a], t_start[a + 1]):
+                motion[a] += t_value[e] * answer[t_column[e]]
+    return motions

@@ -157,7 +157,7 @@ def apply_low_rank(out: Array, p: Array, rows: Rows, mobility: MobilityArrays) -
     """out += J A^-1 J^T p; returns p . J A^-1 J^T p."""
     size = max(mobility[0].shape[0], mobility[1].size - 1)
     load = sum_rows(p, rows, size)
-    motion = respond(load, mobility)
+    motion = respond(load.reshape(1, size), mobility)[0]
     energy = 0.0
     for a in range(size):
         energy += motion[a] * load[a]
@@ -173,12 +173,14 @@ def solve(
     tolerance: float,
     absolute: float,
     guessed: bool,
+    applied: bool,
 ) -> tuple[int, float, bool]:
     """Solve A x = rhs from the guess in x; all of it on one thread, or on all.
 
     vectors  padded x and rhs, scratch r, p, q with ghosts 0; rhs loses its part along the null
-             vectors, x as well at the end
+             vectors, x as well at the end; q is A x then, unless x = 0 without a guess
     guessed  whether x is other than 0
+    applied  whether q is A x
     returns  iterations, |rhs - A x| / |rhs|, whether the residual asked for was reached
     """
     finest, rows, mobility, beyond, label, null = matrix
@@ -202,11 +204,13 @@ def solve(
         return 0, 1.0 if norm > 0.0 else norm, norm <= goal
     while True:
         if guessed or iterations:
-            remove_null(x, label, null)
-            wrap_ghosts(x, periodic)
-            apply_laplacian(q, x, finest)
-            apply_low_rank(q, x, rows, mobility)
-            add_term(q, x, *beyond)
+            if not applied:
+                remove_null(x, label, null)
+                wrap_ghosts(x, periodic)
+                apply_laplacian(q, x, finest)
+                apply_low_rank(q, x, rows, mobility)
+                add_term(q, x, *beyond)
+            applied = False
             square = true_residual(r, rhs, q)
             if null.size:
                 remove_null(r, label, null)

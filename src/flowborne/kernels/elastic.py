@@ -28,6 +28,9 @@ SAINT_VENANT_KIRCHHOFF, STABLE_NEO_HOOKEAN = 0, 1
 SWEEPS = 12
 """Most sweeps of Jacobi's method, which needs four or five."""
 
+LANES = 4
+"""Nodes of an element that are worked on together, so that the compiler makes vector code."""
+
 
 @kernel
 def deformation(shift: Array, nodes: Integers, gradients: Array, F: Array) -> None:
@@ -161,7 +164,10 @@ def diagonalise(A: Array, V: Array) -> None:
 def singular_values(F: Array, U: Array, V: Array, sigma: Array) -> None:
     """F = U diag(sigma) V^T with rotations U and V (3, 3); the last of sigma (3,), which is the
     smallest, is negative where det F is."""
-    A = F.T @ F
+    A = np.empty((3, 3))
+    for i in range(3):
+        for j in range(3):
+            A[i, j] = F[0, i] * F[0, j] + F[1, i] * F[1, j] + F[2, i] * F[2, j]
     diagonalise(A, V)
     for i in range(2):  # the largest first
         for j in range(2 - i):
@@ -169,7 +175,9 @@ def singular_values(F: Array, U: Array, V: Array, sigma: Array) -> None:
                 A[j, j], A[j + 1, j + 1] = A[j + 1, j + 1], A[j, j]
                 for k in range(3):
                     V[k, j], V[k, j + 1] = V[k, j + 1], -V[k, j]
-    U[:] = F @ V
+    for i in range(3):
+        for j in range(3):
+            U[i, j] = F[i, 0] * V[0, j] + F[i, 1] * V[1, j] + F[i, 2] * V[2, j]
     sigma[0] = np.sqrt(U[0, 0] ** 2 + U[1, 0] ** 2 + U[2, 0] ** 2)
     if sigma[0] == 0.0:
         sigma[:] = 0.0
@@ -260,41 +268,56 @@ def add_stiffness(
     """
     nodes, gradients, volumes, moduli, laws = elements
     count = nodes.shape[1]
+    padded = (count + LANES - 1) // LANES * LANES
     F, U, V = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     H, R, sigma = np.empty((3, 3)), np.empty((3, 3)), np.empty(3)
-    D, half, block = np.empty((3, 3, 3, 3)), np.empty((3, 3, 3)), np.empty((3, 3))
-    g = np.empty((count, 3))
+    D, g, half = np.empty((3, 3, 3, 3)), np.zeros((3, padded)), np.empty((3, 3, 3, padded))
+    block = np.empty((count, 3, 3, padded))
     for e in range(nodes.shape[0]):
+        block[:] = 0.0
         for q in range(volumes.shape[1]):
             deformation(shift, nodes[e], gradients[e, q], F)
             singular_values(F, U, V, sigma)
             principal_moduli(sigma, moduli[e, q, 0], moduli[e, q, 1], laws[e], H, R)
             turned_moduli(U, H, R, D)
             for a in range(count):
+                x, y, z = gradients[e, q, a]
                 for j in range(3):
-                    g[a, j] = 0.0
-                    for i in range(3):
-                        g[a, j] += gradients[e, q, a, i] * V[i, j]
-            for a in range(count):
+                    g[j, a] = x * V[0, j] + y * V[1, j] + z * V[2, j]
+            add_blocks(block, half, D, g, volumes[e, q])
+        for a in range(count):
+            for b in range(a, count):
+                above, below = slot[e, a, b], slot[e, b, a]
+                across, along = stride[nodes[e, a]], stride[nodes[e, b]]
                 for m in range(3):
                     for n in range(3):
-                        for o in range(3):
-                            half[m, n, o] = volumes[e, q] * (
-                                g[a, 0] * D[m, 0, n, o]
-                                + g[a, 1] * D[m, 1, n, o]
-                                + g[a, 2] * D[m, 2, n, o]
-                            )
-                for b in range(a, count):
-                    for m in range(3):
-                        for n in range(3):
-                            block[m, n] = (
-                                half[m, n, 0] * g[b, 0]
-                                + half[m, n, 1] * g[b, 1]
-                                + half[m, n, 2] * g[b, 2]
-                            )
-                    above, below = slot[e, a, b], slot[e, b, a]
-                    for m in range(3):
-                        for n in range(3):
-                            values[above + m * stride[nodes[e, a]] + n] += block[m, n]
-                            if a != b:
-                                values[below + n * stride[nodes[e, b]] + m] += block[m, n]
+                        values[np.uint64(above + m * across + n)] += block[a, m, n, b]
+                        if a != b:
+                            values[np.uint64(below + n * along + m)] += block[a, m, n, b]
+
+
+@kernel
+def add_blocks(block: Array, half: Array, D: Array, g: Array, volume: float) -> None:
+    """Add a point's part of the stiffness between nodes a and b >= a to block[a, m, n, b], N/m.
+
+        volume  sum over j, o of  g[j, a] D[m, j, n, o] g[o, b]
+
+    half  (3, 3, 3, k) is overwritten
+    """
+    g0, g1, g2 = g[0], g[1], g[2]
+    for m in range(3):
+        for n in range(3):
+            for o in range(3):
+                x, y, z = volume * D[m, 0, n, o], volume * D[m, 1, n, o], volume * D[m, 2, n, o]
+                filled = half[m, n, o]
+                for a in range(filled.size):
+                    filled[a] = x * g0[a] + y * g1[a] + z * g2[a]
+    for a in range(block.shape[0]):
+        first = a // LANES * LANES
+        b0, b1, b2 = g0[first:], g1[first:], g2[first:]
+        for m in range(3):
+            for n in range(3):
+                x, y, z = half[m, n, 0, a], half[m, n, 1, a], half[m, n, 2, a]
+                added = block[a, m, n, first:]
+                for b in range(added.size):
+                    added[b] += x * b0[b] + y * b1[b] + z * b2[b]

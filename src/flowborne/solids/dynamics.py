@@ -82,10 +82,14 @@ class Kinematics:
         return self.twist_jacobian.reshape(bodies * components, dofs)
 
     @cached_property
+    def bone_jacobian(self) -> csr_array:
+        """(6 nbody, nv) the same, sparse."""
+        return csr_array(self.twist_rows)
+
+    @cached_property
     def jacobian(self) -> csr_array:
         """(k, nv) T, from v to all twists, followed by the velocities of all vertices."""
-        both = [csr_array(self.twist_rows), self.vertex_jacobian]
-        return csr_array(vstack(both, format="csr"))
+        return csr_array(vstack([self.bone_jacobian, self.vertex_jacobian], format="csr"))
 
 
 @dataclass(frozen=True)
@@ -138,8 +142,10 @@ class System(ABC):
         if self.halfway is None:
             return self.own, True
         own, rounding = self.halfway.impulse(v_plus)
-        scale = abs(self.A) @ (np.abs(v_plus) + REST_SPEED)
-        return own, bool((np.abs(own - self.own) <= CORIOLIS_TOLERANCE * scale + rounding).all())
+        change = np.abs(own - self.own)
+        n = np.flatnonzero(~(change <= rounding))
+        scale = abs(self.A[n]) @ (np.abs(v_plus) + REST_SPEED)
+        return own, bool((change[n] <= CORIOLIS_TOLERANCE * scale + rounding[n]).all())
 
 
 @dataclass(frozen=True)

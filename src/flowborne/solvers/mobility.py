@@ -48,10 +48,7 @@ class Mobility:
         """A^-1 applied to a load (k,), or to every row of (n, k)."""
         if self.is_dense:
             return np.asarray(load @ self.arrays[0])
-        answers = np.zeros_like(load)
-        for row, answer in zip(np.atleast_2d(load), np.atleast_2d(answers), strict=True):
-            answer[:] = respond(np.ascontiguousarray(row), self.arrays)
-        return answers
+        return respond(np.ascontiguousarray(np.atleast_2d(load)), self.arrays).reshape(load.shape)
 
     def largest(self) -> float:
         """Size of the largest entry of A^-1; of a factorised one, of its compliant modes alone."""

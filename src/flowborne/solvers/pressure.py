@@ -140,6 +140,7 @@ class PressureSystem:
             faces = (np.zeros((1, 1, 1)), x.reshape(1, nx + 1, ny), y.reshape(1, nx, ny + 1))
         self.beyond = padded_cells(beyond[0], inner), *beyond[1:]
         self._prepared: tuple[LowRankTerm, Matrix, Preconditioner] | None = None
+        self._applied: Array | None = None  # the pressure of the last solve, if its A p is known
         self.buffers = borrow(inner, wraps, self)
         self.regions, self.scale, self.finest = self.buffers.prepare(faces, reaction)
 
@@ -153,26 +154,30 @@ class PressureSystem:
     ) -> PressureSolution:
         """Solve to  |rhs - A p| <= max(tolerance |rhs|, absolute).
 
-        rhs, guess  (nx, ny, nz); values in cells without an open face are ignored
+        rhs, guess  (nx, ny, nz); values in cells without an open face are ignored. A guess that is
+                    the last solution itself goes on from where that solve ended
         """
         if not term.mobility.yields:
             term = NO_TERM
         b, cells = self.buffers, self.inner
         diagonal = b.finest[3]
         x, right = b.vectors[:2]
+        same = self._prepared is not None and self._prepared[0] is term
+        applied = same and guess is not None and guess is self._applied
         if guess is None:
             x[:] = 0.0
-        else:
+        elif not applied:
             load_cells(x, np.ascontiguousarray(guess, np.float64).reshape(cells), diagonal)
         load_cells(right, np.ascontiguousarray(rhs, np.float64).reshape(cells), diagonal)
-        if self._prepared is None or self._prepared[0] is not term:
+        if self._prepared is None or not same:
             self._prepared = term, *self._with_term(term)
         matrix, cycle = self._prepared[1:]
         guessed = guess is not None and bool(guess.any())
         iterations, residual, converged = solve(
-            matrix, cycle, b.vectors, tolerance, absolute, guessed
+            matrix, cycle, b.vectors, tolerance, absolute, guessed, applied
         )
         pressure = x[self.inside].copy().reshape(self.shape)
+        self._applied = pressure if pressure.any() else None
         return PressureSolution(pressure, int(iterations), float(residual), bool(converged))
 
     def closed_regions(self) -> Indices:
