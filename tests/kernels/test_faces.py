@@ -8,7 +8,6 @@ import pytest
 from flowborne.kernels.faces import (
     accelerate,
     changes_of_step,
-    largest_open,
     largest_size,
     mean_flux,
     mean_row,
@@ -46,7 +45,7 @@ def test_threads_change_no_bit() -> None:
     before, after, weight = fields((40, 33, 37), 3)
     change = weighted_change(weight, before, after)
     assert weighted_change.parallel(weight, before, after) == change
-    assert largest_open.parallel(before, after) == largest_open(before, after)
+    assert largest_size.parallel(before, after) == largest_size(before, after)
 
 
 @SHAPES
@@ -96,8 +95,8 @@ def test_weighted_change(shape: Shape) -> None:
 
 
 @SHAPES
-def test_largest_open(shape: Shape) -> None:
+def test_largest_size(shape: Shape) -> None:
     field, opened = fields(shape, 2)
     expected = np.abs(field).max(where=opened > 0.0, initial=0.0)
-    assert largest_open(field, opened) == expected
+    assert largest_size(field, opened) == expected
     assert largest_size(field) == np.abs(field).max()

@@ -144,26 +144,14 @@ def weighted_change(weight: Array, before: Array, after: Array) -> tuple[float, 
 
 
 @kernel
-def largest_size(field: Array) -> float:
-    """Largest size of a field."""
+def largest_size(field: Array, opened: Array | None = None) -> float:
+    """Largest size of a field; of its faces that are not wholly closed, if open parts are given."""
     values, most = flat(field), np.zeros(field.shape[0])
+    part = values if opened is None else flat(opened)
     for i in prange(values.shape[0]):
         found = 0.0
         for k in range(values.shape[1]):
-            size = abs(values[i, k])
-            found = size if size > found else found
-        most[i] = found
-    return float(most.max())
-
-
-@kernel
-def largest_open(field: Array, opened: Array) -> float:
-    """Largest size of a field on faces that are not wholly closed."""
-    values, part, most = flat(field), flat(opened), np.zeros(field.shape[0])
-    for i in prange(values.shape[0]):
-        found = 0.0
-        for k in range(values.shape[1]):
-            size = abs(values[i, k]) if part[i, k] > 0.0 else 0.0
+            size = abs(values[i, k]) if opened is None or part[i, k] > 0.0 else 0.0
             found = size if size > found else found
         most[i] = found
     return float(most.max())
