@@ -14,7 +14,6 @@ from flowborne.fluid.sides.side import Place
 from flowborne.fluid.wake import (
     BIN,
     BINS,
-    across,
     after_move,
     images,
     leaving,
@@ -68,7 +67,7 @@ def test_far_away_bins_induce_what_their_vortices_do() -> None:
     bins, nodes = np.zeros((BINS, 2)), edges_of(Place(GRID, 1, False), 2)
     offsets, vortices = np.array([0.4, -0.2]), np.array([1.0, -0.7])
     bins[40] = vortices.sum(), vortices @ offsets
-    places = line.middles[40] + offsets[:, None] * across(line)
+    places = line.middles[40] + offsets[:, None] * line.across
     away = np.linalg.norm(nodes[:, None] - places, axis=2)
     expected = -np.log(away) @ vortices / (2.0 * np.pi)
     found = stream_function(line, bins, nodes)
@@ -84,7 +83,7 @@ def test_the_last_bin_goes_on_for_ever() -> None:
     many = line.start + np.multiply.outer(line.length * (np.arange(100 * BINS) + 0.5), line.along)
     away = nodes[:, None] - many
     square = (away**2).sum(axis=2)
-    expected = np.diff((0.3 * (away @ across(line)) / square).sum(axis=1) / (2.0 * np.pi))
+    expected = np.diff((0.3 * (away @ line.across) / square).sum(axis=1) / (2.0 * np.pi))
     np.testing.assert_allclose(found, expected, rtol=0.02)
 
 

@@ -16,6 +16,7 @@ from flowborne.kernels.distance import (
     ELLIPSOID,
     MESH,
     SPHERE,
+    Samples,
     distances,
     signed_distance,
 )
@@ -30,9 +31,8 @@ from .references.triangles import closest_on_triangle_reference
 
 KINDS = (SPHERE, CAPSULE, CYLINDER, BOX, ELLIPSOID, MESH)
 SIZE = np.array([0.5, 0.7, 0.4])
-TABLE = np.array([3, 5, 4, 6])
-TABLES = np.random.default_rng(0).standard_normal(3 + TABLE[1:].prod())
-CORNER, PITCH = np.array([-0.6, -0.4, -0.7]), 0.25
+VALUES = np.random.default_rng(0).standard_normal((5, 4, 6))
+SAMPLES = Samples(np.array([-0.6, -0.4, -0.7]), 0.25, VALUES)
 CUBE = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
 SQUARES = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
 FACES = np.array([half for a, b, c, d in SQUARES for half in ((a, b, c), (a, c, d))])
@@ -41,11 +41,10 @@ FACES = np.array([half for a, b, c, d in SQUARES for half in ((a, b, c), (a, c, 
 @pytest.mark.parametrize("kind", KINDS)
 def test_signed_distance(kind: int) -> None:
     points = np.random.default_rng(1).uniform(-1.5, 1.5, (200, 3))
-    table = TABLES, TABLE, CORNER, PITCH
-    expected = signed_distance_reference(kind, SIZE, points, *table)
+    expected = signed_distance_reference(kind, SIZE, points, SAMPLES)
     assert (expected < 0.0).any()
     assert (expected > 0.0).any()
-    found = [signed_distance(kind, SIZE, tuple(point), *table) for point in points]
+    found = [signed_distance(kind, SIZE, tuple(point), SAMPLES) for point in points]
     np.testing.assert_allclose(found, expected, atol=1e-13)
     if kind not in (ELLIPSOID, MESH):
         np.testing.assert_allclose(distances(kind, SIZE, points), expected, atol=1e-13)
@@ -97,26 +96,12 @@ def test_a_body_of_several_geometries_at_the_nodes(shape: tuple[int, int, int]) 
         np.testing.assert_array_equal(box, node_box_reference(*chosen, origin, h, limits))
         if flat:
             box[2] = 0, 2
-        given = (
-            box,
-            geoms,
-            np.array(KINDS),
-            size,
-            position,
-            rotation,
-            TABLES,
-            np.tile(TABLE, (count, 1)),
-            np.tile(CORNER, (count, 1)),
-            np.full(count, PITCH),
-            origin,
-            h,
-            flat,
-        )
+        given = (box, geoms, np.array(KINDS), size, position, rotation, SAMPLES, origin, h, flat)
         expected = sample_body_reference(*given)
         phi = np.full(expected.shape, BAND * h)
         for g in geoms:
             at = position[g], rotation[g]
-            body = Placed(KINDS[g], size[g], *at, TABLES, TABLE, CORNER, PITCH)
+            body = Placed(KINDS[g], size[g], *at, SAMPLES)
             lower_to_body(phi, box, body, nodes)
         np.testing.assert_allclose(phi, expected, atol=1e-13)
         assert expected.max() <= BAND * h

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from flowborne.coupling.shapes import UNSAMPLED
 from flowborne.kernels.arrays import Array, Nodes
 from flowborne.kernels.edge_crossings import (
     PIECES,
@@ -34,8 +35,7 @@ PLACES = np.random.default_rng(5)
 
 
 def placed(shape: Primitive, middle: Array, turn: Array) -> Placed:
-    none = np.zeros(1), np.zeros(4, np.int64), np.zeros(3), 1.0
-    return Placed(shape.code, shape.size, middle, turn, *none)
+    return Placed(shape.code, shape.size, middle, turn, UNSAMPLED)
 
 
 def crossed(body: Placed, origin: Array) -> tuple[Array, Crossings]:

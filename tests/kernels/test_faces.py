@@ -8,7 +8,6 @@ import pytest
 from flowborne.kernels.faces import (
     accelerate,
     changes_of_step,
-    largest_open,
     largest_size,
     mean_flux,
     mean_row,
@@ -97,7 +96,7 @@ def test_weighted_sums(shape: Shape) -> None:
 
 
 @SHAPES
-def test_largest_open(shape: Shape) -> None:
+def test_largest_size(shape: Shape) -> None:
     field, opened = fields(shape, 2)
     for part in (0.0, 0.5):
         expected = np.abs(field).max(where=opened > part, initial=0.0)

@@ -9,7 +9,7 @@ import numpy as np
 
 from flowborne.fluid.grid import Grid
 from flowborne.kernels.arrays import Array, Integers, Mask, Mesh
-from flowborne.kernels.distance import SPHERE
+from flowborne.kernels.distance import SPHERE, Samples
 from flowborne.kernels.edge_crossings import Placed
 from flowborne.shapes.mesh import ShapeThickened, smooth_sheets
 from flowborne.shapes.shape import Shape
@@ -23,6 +23,8 @@ of a cell. A thinner body is seen by the fluid as that thick; its mass and its d
 stay its own.
 """
 
+UNSAMPLED = Samples(np.zeros(3), 1.0, np.zeros((1, 1, 1)))
+
 
 @dataclass(frozen=True)
 class Shapes:
@@ -33,10 +35,7 @@ class Shapes:
     reach   (ng, 3) half extents of the bounding box in the geometry's frame, m
     body    (ng,) body that the geometry belongs to, ascending
     source  (ng,) index of the geometry in the model
-    tables  samples of the distance to those without a formula, in a room; flat, one after another
-    table   (ng, 4) first sample, then counts along x, y, z
-    corner  (ng, 3) first sample's place in the geometry's frame, m
-    pitch   (ng,) distance between samples, m
+    samples (ng) of the distance to those without a formula, in a room; of others UNSAMPLED
     skins   geometry -> vertices and faces to which distances near by are exact
     pieces  geometry -> smooth sheet of each of these faces
     sheets  (ng,) whether the samples are of sheets within a skin
@@ -47,18 +46,14 @@ class Shapes:
     reach: Array
     body: Integers
     source: Integers
-    tables: Array
-    table: Integers
-    corner: Array
-    pitch: Array
+    samples: list[Samples]
     skins: dict[int, Mesh]
     pieces: dict[int, Integers]
     sheets: Mask
 
     def placed(self, position: Array, rotation: Array) -> list[Placed]:
         """The geometries at positions (ng, 3), m, and in rotations (ng, 3, 3), for kernels."""
-        kinds, tables, pitches = self.kind.tolist(), [self.tables] * len(position), self.pitch
-        own = kinds, self.size, position, rotation, tables, self.table, self.corner, pitches
+        own = self.kind.tolist(), self.size, position, rotation, self.samples
         return [Placed(*each) for each in zip(*own, strict=True)]
 
     @cached_property
@@ -74,18 +69,8 @@ def shapes(model: SolidModel, grid: Grid) -> Shapes:
     """Geometries of `model` as `grid` sees them: thickened to be watertight, endless in a slab."""
     order = np.argsort(model.geom_body, kind="stable")
     chosen = [int(g) for g in order if not model.geom_covered[g]]
-    count = len(chosen)
     seen = [seen_shape(model, g, grid) for g in chosen]
-    table, corner, pitch = np.zeros((count, 4), np.int64), np.zeros((count, 3)), np.ones(count)
-    tables: list[Array] = []
-    first = 0
-    for n, shape in enumerate(seen):
-        sampled = None if grid.is_slab else shape.samples(grid.spacing)
-        if sampled is not None:
-            corner[n], pitch[n], values = sampled
-            table[n] = first, *values.shape
-            tables.append(values.ravel())
-            first += values.size
+    sampled = [None if grid.is_slab else shape.samples(grid.spacing) for shape in seen]
     skins = {n: skin for n, shape in enumerate(seen) if (skin := shape.skin()) is not None}
     return Shapes(
         np.array([shape.code for shape in seen], np.int64),
@@ -93,10 +78,7 @@ def shapes(model: SolidModel, grid: Grid) -> Shapes:
         np.array([shape.reach for shape in seen]).reshape(-1, 3),
         np.asarray(model.geom_body)[chosen].astype(np.int64),
         np.array(chosen, np.int64),
-        np.concatenate(tables) if tables else np.zeros(1),
-        table,
-        corner,
-        pitch,
+        [UNSAMPLED if samples is None else samples for samples in sampled],
         skins,
         {n: smooth_sheets(*skin) for n, skin in skins.items()},
         np.array([isinstance(shape, ShapeThickened) for shape in seen], bool),

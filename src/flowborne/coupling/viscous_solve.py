@@ -33,7 +33,7 @@ from flowborne.coupling.report import timed
 from flowborne.coupling.world import World
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.ghosts import edge
-from flowborne.fluid.grid import Grid
+from flowborne.fluid.grid import Grid, faces_of
 from flowborne.fluid.projection import PressureGradient
 from flowborne.fluid.viscosity import OpenParts, ViscousFaces, assemble_viscosity
 from flowborne.kernels.arrays import Array, Faces, Integers, Mask
@@ -122,26 +122,17 @@ class Walls:
 
 def walls_of(systems: list[ViscousFaces], cut: Geometry, grid: Grid) -> Walls:
     """The walls of all components on the bodies in the grid."""
-    parts = []
-    first = 0
-    for axis, system in zip(grid.axes, systems, strict=True):
-        parts.append(walls_across(axis, first, system, cut, grid))
-        first += system.kind.size
-    joined = {
-        field.name: np.concatenate([getattr(part, field.name) for part in parts])
-        for field in fields(Walls)
-        if field.name != "weight"
-    }
+    own = zip(grid.axes, systems, strict=True)
+    parts = [walls_across(axis, system, cut, grid) for axis, system in own]
+    names = [field.name for field in fields(Walls) if field.name != "weight"]
+    joined = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
     weight = block_diag([part.weight for part in parts], format="csr")
     return Walls(**joined, weight=csr_array(weight))
 
 
-def walls_across(axis: int, first: int, system: ViscousFaces, cut: Geometry, grid: Grid) -> Walls:
+def walls_across(axis: int, system: ViscousFaces, cut: Geometry, grid: Grid) -> Walls:
     """The pieces of wall of the faces across `axis`, those around corners, and the tied ones; each
-    belongs to the body nearest to one of its nodes.
-
-    first  position of the component among the concatenated faces
-    """
+    belongs to the body nearest to one of its nodes."""
     moved = np.flatnonzero(system.kind == TIED)
     around, _, corner_node = system.corners
     index = np.concatenate([system.beside, around.ravel(), moved])
@@ -164,7 +155,7 @@ def walls_across(axis: int, first: int, system: ViscousFaces, cut: Geometry, gri
     point = cut.images.at_bodies(point, body)
     across = np.tile(np.eye(3)[axis], (index.size, 1))
     return Walls(
-        index=first + index,
+        index=system.first + index,
         tied=np.arange(index.size) >= met + around.size,
         weight=weights(system, system.mass.reshape(-1)[moved]),
         body=body,
@@ -194,9 +185,7 @@ def between_faces(systems: list[ViscousFaces], scale: Array) -> tuple[Integers, 
 
     scale  of the concatenated faces
     """
-    sizes = [0, *(system.kind.size for system in systems)]
-    each = zip(systems, np.cumsum(sizes), strict=False)
-    around = np.concatenate([first + system.corners.faces for system, first in each])
+    around = np.concatenate([system.first + system.corners.faces for system in systems])
     between = np.concatenate([system.corners.matrix for system in systems])
     between = between * (1.0 - np.eye(AROUND))
     between *= scale[around][:, :, None]
@@ -228,8 +217,7 @@ class ViscousSystem:
         dt: float,
     ) -> None:
         self.systems, self.walls, self.size, self.grid, self.dt = systems, walls, size, grid, dt
-        periodic = boundaries.periodic()
-        self.wraps = np.array([n if p else 0 for n, p in zip(grid.shape, periodic, strict=True)])
+        self.wraps = np.array(grid.shape) * np.array(boundaries.periodic())
         self.diagonal = np.concatenate([system.diagonal.ravel() for system in systems])
         unknown = self.diagonal > 0.0
         self.scale = np.where(unknown, 1.0 / np.sqrt(np.where(unknown, self.diagonal, 1.0)), 0.0)
@@ -253,11 +241,9 @@ class ViscousSystem:
         `spread`)."""
         out = np.zeros_like(x)
         product, given = out.reshape(-1), x.reshape(-1)
-        first = 0
         for system in self.systems:
-            part = slice(first, first + system.kind.size)
+            part = system.part
             apply_component(product[part], given[part], self.scale[part], system.links, self.wraps)
-            first += system.kind.size
         if self.corner_faces.size:
             product[self.corner_faces] += self.corners @ given[self.corner_faces]
         if self.answer.yields:
@@ -311,15 +297,11 @@ class ViscousSystem:
     def _split(self, values: Array, like: Faces) -> Faces:
         """Concatenated components as faces; periodic ends joined; a slab's z as it was."""
         parts = [like[0], like[1], like[2].copy()]
-        first = 0
-        for axis in self.grid.axes:
-            shape = self.grid.face_shape(axis)
-            count = int(np.prod(shape))
-            parts[axis] = values[first : first + count].reshape(shape)
+        for axis, system in zip(self.grid.axes, self.systems, strict=True):
+            parts[axis] = values[system.part].reshape(system.kind.shape)
             if self.wraps[axis]:
                 parts[axis][edge(axis, -1)] = parts[axis][edge(axis, 0)]
-            first += count
-        return parts[0], parts[1], parts[2]
+        return faces_of(parts)
 
 
 @timed("viscosity")
@@ -349,7 +331,7 @@ def diffuse(
     grid, sides = fluid.grid, fluid.boundaries
     last, wraps = state.pressure.copy(), np.array(grid.shape) * np.array(sides.periodic())
     fill_fresh(last, cut.open, np.flatnonzero(last == 0.0), wraps)
-    pushed = velocity[0].copy(), velocity[1].copy(), velocity[2].copy()
+    pushed = faces_of([u.copy() for u in velocity])
     gradient.subtract(pushed, last, dt)
     earlier = pressure_push(cut, dt * last, size)
     moving = boundary_velocity(pose, driven.after(generalised(pose, earlier)))

@@ -66,15 +66,11 @@ def dipoles_of(sides: Sequence[tuple[Place, Boundary]]) -> Dipoles | None:
     grid = places[0].grid
     number = np.arange(np.prod(grid.shape)).reshape(grid.shape)
     layers = [number[place.layer] for place in places]
-    columns = np.concatenate(
-        [
-            _spread(first.pressure_weight(place), on)
-            for place, on in zip(places, layers, strict=True)
-        ]
-    )
+    at = list(zip(places, layers, strict=True))
+    columns = np.concatenate([_spread(first.pressure_weight(place), on) for place, on in at])
     vectors: list[Array] = []
     for k in directions(sides, first.centre):
-        parts = [_dipole(first, place, k, on) for place, on in zip(places, layers, strict=True)]
+        parts = [_dipole(first, place, k, on) for place, on in at]
         p, n = (np.concatenate(halves) for halves in zip(*parts, strict=True))
         Wp = columns * p
         vectors += [n / np.sqrt(p @ n), Wp / np.sqrt(p @ Wp)]

@@ -20,7 +20,7 @@ import numpy as np
 from scipy import fft
 
 from flowborne.fluid.boundary import places
-from flowborne.fluid.ghosts import plane, planes
+from flowborne.fluid.ghosts import edge, plane, planes
 from flowborne.fluid.grid import Grid
 from flowborne.fluid.sides.far import Sea
 from flowborne.fluid.sides.side import Place
@@ -44,21 +44,17 @@ the pressure solve has left, and no source."""
 
 
 def circulations(velocity: Faces, grid: Grid) -> OnEdges:
-    """Circulation round the edges inside a domain, m^2/s; 0 round those on the sides."""
-    return {a: edge_circulation(velocity, grid, a) for a in ((2,) if grid.is_slab else range(3))}
-
-
-def edge_circulation(velocity: Faces, grid: Grid, axis: int) -> Array:
-    """Circulation round the edges along `axis`: (n along the axis, n+1 along the others)."""
-    one, other = (axis + 1) % 3, (axis + 2) % 3
-    inner, inside = [slice(None)] * 3, [slice(None)] * 3
-    inner[other], inside[one] = slice(1, -1), slice(1, -1)
-    turning = np.diff(velocity[other][tuple(inner)], axis=one)
-    turning -= np.diff(velocity[one][tuple(inside)], axis=other)
-    edges = np.zeros([n + (a != axis) for a, n in enumerate(grid.shape)])
-    inner[one] = slice(1, -1)
-    np.multiply(grid.spacing, turning, out=edges[tuple(inner)])
-    return edges
+    """Circulation round the edges inside a domain, m^2/s, (n along their axis, n+1 along the
+    others); 0 round those on the sides."""
+    found = {}
+    for axis in (2,) if grid.is_slab else range(3):
+        one, other = (axis + 1) % 3, (axis + 2) % 3
+        inner = edge(other, slice(1, -1))
+        turning = np.diff(velocity[other][inner], axis=one)
+        turning -= np.diff(velocity[one][edge(one, slice(1, -1))], axis=other)
+        found[axis] = np.zeros([n + (a != axis) for a, n in enumerate(grid.shape)])
+        np.multiply(grid.spacing, turning, out=found[axis][inner][edge(one, slice(1, -1))])
+    return found
 
 
 def potentials(

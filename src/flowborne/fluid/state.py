@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
-from flowborne.fluid.grid import Grid
+from flowborne.fluid.grid import Grid, faces_of
 from flowborne.kernels.arrays import Array, Faces
+
+ON_FACES = "velocity", "velocity_change", "acceleration"
+WHOLE = "pressure", "previous_pressure", "cell_volume", "pose", "wake", "sea"
+"""The fields of `FluidState` in their order: those of three arrays, and those of one."""
 
 
 @dataclass
@@ -46,45 +51,28 @@ class FluidState:
         cls, grid: Grid, scalars: tuple[str, ...] = (), wake: tuple[int, int, int] = (0, 0, 0)
     ) -> FluidState:
         """Still fluid without pressure or dye, with a wake of this shape."""
-        return cls(
-            grid.zeros_faces(),
-            grid.zeros_faces(),
-            grid.zeros_faces(),
-            np.zeros(grid.shape),
-            np.zeros(grid.shape),
-            wake=np.zeros(wake),
-            scalars={name: np.zeros(grid.shape) for name in scalars},
-        )
+        faces = grid.zeros_faces(), grid.zeros_faces(), grid.zeros_faces()
+        dyes = {name: np.zeros(grid.shape) for name in scalars}
+        cells = np.zeros(grid.shape), np.zeros(grid.shape)
+        return cls(*faces, *cells, wake=np.zeros(wake), scalars=dyes)
 
     def copy(self) -> FluidState:
         return FluidState.from_arrays({k: v.copy() for k, v in self.arrays().items()})
 
     def arrays(self) -> dict[str, Array]:
         """Every array by a name; `from_arrays` is the way back."""
-        whole = "pressure", "previous_pressure", "cell_volume", "pose", "wake", "sea"
-        named = {name: getattr(self, name) for name in whole}
-        for name in ("velocity", "velocity_change", "acceleration"):
+        named = {name: getattr(self, name) for name in WHOLE}
+        for name in ON_FACES:
             for axis, values in zip("xyz", getattr(self, name), strict=True):
                 named[f"{name}_{axis}"] = values
         return named | {f"scalar_{name}": values for name, values in self.scalars.items()}
 
     @classmethod
     def from_arrays(cls, arrays: dict[str, Array]) -> FluidState:
-        def faces(name: str) -> Faces:
-            return arrays[f"{name}_x"], arrays[f"{name}_y"], arrays[f"{name}_z"]
-
-        return cls(
-            faces("velocity"),
-            faces("velocity_change"),
-            faces("acceleration"),
-            arrays["pressure"],
-            arrays["previous_pressure"],
-            arrays["cell_volume"],
-            arrays["pose"],
-            arrays["wake"],
-            arrays["sea"],
-            under("scalar_", arrays),
-        )
+        fields: dict[str, Any] = {name: arrays[name] for name in WHOLE}
+        for name in ON_FACES:
+            fields[name] = faces_of([arrays[f"{name}_{axis}"] for axis in "xyz"])
+        return cls(**fields, scalars=under("scalar_", arrays))
 
 
 def under(prefix: str, arrays: dict[str, Array]) -> dict[str, Array]:

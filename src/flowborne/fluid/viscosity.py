@@ -74,6 +74,7 @@ class Corners(NamedTuple):
 class ViscousFaces:
     """The viscous system of the faces across one axis; arrays have the shape of the faces.
 
+    first     position of the component among the concatenated faces
     kind      INACTIVE, UNKNOWN, GIVEN or TIED
     mass      m / dt, kg/s; see SIDE_MASS
     diagonal  m / dt + sum of links + W of unknowns, else 0, kg/s
@@ -88,6 +89,7 @@ class ViscousFaces:
     corners   what they add
     """
 
+    first: int
     kind: Marks
     mass: Array
     diagonal: Array
@@ -100,6 +102,11 @@ class ViscousFaces:
     place: Array
     node: Integers
     corners: Corners
+
+    @property
+    def part(self) -> slice:
+        """Where the component is among the concatenated faces."""
+        return slice(self.first, self.first + self.kind.size)
 
 
 @dataclass(frozen=True)
@@ -134,12 +141,11 @@ def assemble_viscosity(
     masses    Faces, of the fluid that belongs to each face, kg
     time      s, of the sides' prescribed velocities
     """
-    normal = boundaries.normal()
-    periodic = boundaries.periodic()
-    h = grid.spacing
+    normal, periodic, h = boundaries.normal(), boundaries.periodic(), grid.spacing
     stiffness = viscosity * grid.face_area / h
     edges, parts = (cut.distance, cut.crossings), cut.cells / grid.cell_volume
-    systems, wraps = [], np.array(grid.shape) * np.array(periodic)
+    systems: list[ViscousFaces] = []
+    wraps = np.array(grid.shape) * np.array(periodic)
     found = find_corners(*edges, h)
     for axis in grid.axes:
         shape, opened = grid.face_shape(axis), cut.faces[axis]
@@ -168,7 +174,8 @@ def assemble_viscosity(
         met = wall != 0.0
         beside = np.repeat(beside, met.sum(axis=1))
         pieces = beside, wall[met], h * gap[met], h * place[met], node[met]
-        system = kind, mass, diagonal, links, given, h * centre, *pieces, corners
+        first = systems[-1].part.stop if systems else 0
+        system = first, kind, mass, diagonal, links, given, h * centre, *pieces, corners
         systems.append(ViscousFaces(*system))
     return systems
 

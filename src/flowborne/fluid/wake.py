@@ -71,7 +71,10 @@ def induced(field: Faces, sea: Sea, wake: Array, dt: float) -> tuple[Normal, Arr
     for place in sea.driven:
         for axis, values in of_wake(line, whole, place).items():
             sides[place][axis] += values.reshape(sides[place][axis].shape)
-        normal[place] = normal_velocity(sides[place], place) + end_velocity(line, whole, place)
+        normal[place] = normal_velocity(sides[place], place)
+        if not grid.is_slab:  # where it is in the stream function
+            rate = np.array([source_rate(line, whole)])
+            normal[place] += source_velocity(line.end, rate, place)
     rate, speed = leaving(circulation, field, sea.exit, line)
     later[number] = moved(bins, dt * rate, min(1.0, speed * dt / line.length))
     return normal, later
@@ -113,6 +116,11 @@ class WakeLine:
     def middles(self) -> Array:
         """(BINS, d) of the bins, m."""
         return self.at(np.arange(BINS, dtype=float) + 0.5)
+
+    @property
+    def across(self) -> Array:
+        """(2,) unit vector, in a slab: the stream's turned to the left."""
+        return np.array([-self.along[1], self.along[0]])
 
     @property
     def end(self) -> Array:
@@ -163,7 +171,7 @@ def followed(bins: Array, left: Array, before: WakeLine, after: WakeLine) -> Arr
     moved_by, found = after.start - before.start, bins.copy()
     away, count = float(moved_by @ before.along), 1 if bins.shape[1] == 2 else 3
     shift = moved_by - away * before.along
-    arms = shift if count == 3 else shift @ np.array([[-before.along[1]], [before.along[0]]])
+    arms = shift if count == 3 else shift @ before.across[:, None]
     found[:, count:] -= np.einsum("j,ki->kji", arms, bins[:, :count]).reshape(len(bins), -1)
     part = away / before.length
     if part < 0.0:
@@ -199,11 +207,6 @@ def images(mirrors: tuple[Place, ...], grid: Grid) -> Array:
     return total.ravel()
 
 
-def across(line: WakeLine) -> Array:
-    """(2,) unit vector, the stream's turned to the left."""
-    return np.array([-line.along[1], line.along[0]])
-
-
 def of_wake(line: WakeLine, bins: Array, place: Place) -> OnEdges:
     """Tangential components of A of the bins on the edges of a side, each (n,), m^2/s."""
     if place.grid.is_slab:
@@ -217,9 +220,9 @@ def stream_function(line: WakeLine, bins: Array, nodes: Array) -> Array:
     away = nodes[:, None, :] - line.middles
     square = np.einsum("nki,nki->nk", away, away)
     circulation = np.einsum("k,nk->n", bins[:, 0], np.log(square))
-    moment = np.einsum("k,nk->n", bins[:, 1], (away @ across(line)) / square)
+    moment = np.einsum("k,nk->n", bins[:, 1], (away @ line.across) / square)
     rest = nodes - line.end
-    angle = np.arctan2(-rest @ across(line), -rest @ line.along)
+    angle = np.arctan2(-rest @ line.across, -rest @ line.along)
     source = -bins[-1, 1] / line.length
     return np.asarray((moment - 0.5 * circulation + source * angle) / (2.0 * np.pi))
 
@@ -234,15 +237,6 @@ def potential(line: WakeLine, bins: Array, edges: Array, axis: int) -> Array:
     sums, out = (np.add.reduceat(each, first) for each in (own, arms)), np.empty(len(edges))
     wake_potential(out, edges, line.at(middle), *sums)
     return out
-
-
-def end_velocity(line: WakeLine, bins: Array, place: Place) -> Array:
-    """Velocity across a side, m/s, of the source at the line's end; 0 in a slab, where it is in the
-    stream function."""
-    rate = 0.0 if place.grid.is_slab else source_rate(line, bins)
-    if rate == 0.0:
-        return np.zeros(())
-    return source_velocity(line.end, np.array([rate]), place)
 
 
 def source_rate(line: WakeLine, bins: Array) -> float:
@@ -290,7 +284,7 @@ def summed(layer: OnEdges, place: Place, line: WakeLine) -> Array:
     grid = place.grid
     if grid.is_slab:
         column = layer[2].reshape(-1)
-        arms = (edges_of(place, 2)[1:-1] - line.start) @ across(line)
+        arms = (edges_of(place, 2)[1:-1] - line.start) @ line.across
         return np.array([column.sum(), column @ arms])
     total = np.zeros((4, 3))
     for i, edges in layer.items():

@@ -58,17 +58,12 @@ def moved_fluid(
             cell_volume=shifted(state.cell_volume, axis, upper),
             wake=after_move(state.wake, state.velocity, sides.sea(beyond.grid), sides.sea(grid)),
             scalars={
-                name: shifted(dye, axis, upper, _entering(name, side, place, time))
+                name: shifted(dye, axis, upper, 0.0 if came is None else came)
                 for name, dye in state.scalars.items()
+                for came in [side.entering_scalar(name, place, time)]
             },
         )
     return state, grid
-
-
-def _entering(name: str, side: Boundary, place: Place, time: float) -> Array | float:
-    """Dye in the fluid beyond a side."""
-    found = side.entering_scalar(name, place, time)
-    return 0.0 if found is None else found
 
 
 def _with_layer(

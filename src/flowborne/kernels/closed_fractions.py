@@ -106,15 +106,11 @@ def in_a_crease(beside: Integers, axis: int, i: int, j: int, k: int, ring: bool)
     """
     n, count = i if axis == 0 else (j if axis == 1 else k), beside.shape[axis]
     back = count if ring and n == 0 else 0
-    x, y, z = (
-        i + (back - 1) * (axis == 0),
-        j + (back - 1) * (axis == 1),
-        k + (back - 1) * (axis == 2),
-    )
-    low = (n > 0 or ring) and beside[x, y, z] > 1
-    back = count if ring and n == count else 0
-    x, y, z = i - back * (axis == 0), j - back * (axis == 1), k - back * (axis == 2)
-    return bool(low or ((n < count or ring) and beside[x, y, z] > 1))
+    for step, there in ((back - 1, n > 0 or ring), (-count * (n == count), n < count or ring)):
+        x, y, z = i + step * (axis == 0), j + step * (axis == 1), k + step * (axis == 2)
+        if there and beside[x, y, z] > 1:
+            return True
+    return False
 
 
 @njit(nogil=True, cache=True)
@@ -186,11 +182,7 @@ def wall_point(
     for axis in range(3):
         s, t = other_axes(axis)
         for side in range(2):
-            a, b, c = (
-                i + side * int(axis == 0),
-                j + side * int(axis == 1),
-                k + side * int(axis == 2),
-            )
+            a, b, c = i + side * (axis == 0), j + side * (axis == 1), k + side * (axis == 2)
             face = axis, a, b, c
             if is_cut(distance, found, *face) and on_several_pieces(distance, found, *face):
                 _, _, _, count, x, y = closed_face(distance, found, axis, a, b, c, False, False)

@@ -183,7 +183,7 @@ def add_body_velocity(
     """
     axes, faces, bodies, closed, place, corner, weight = parts
     flat_out = out.reshape(-1)
-    rigid = axes.size - len(corner)
+    rigid, one, other = axes.size - len(corner), (axis + 1) % 3, (axis + 2) % 3
     for n in range(axes.size):
         if axes[n] != axis:
             continue
@@ -194,11 +194,6 @@ def add_body_velocity(
                 velocity += weight[n - rigid, c] * flesh[corner[n - rigid, c], axis]
             flat_out[f] += closed[n] * velocity
             continue
-        t, x, y, z = twist[bodies[n]], place[n, 0], place[n, 1], place[n, 2]
-        if axis == 0:
-            velocity = t[0] + t[4] * z - t[5] * y
-        elif axis == 1:
-            velocity = t[1] + t[5] * x - t[3] * z
-        else:
-            velocity = t[2] + t[3] * y - t[4] * x
+        t, p = twist[bodies[n]], place[n]
+        velocity = t[axis] + t[3 + one] * p[other] - t[3 + other] * p[one]
         flat_out[f] += closed[n] * velocity

@@ -1,13 +1,28 @@
-"""Signed distance to a primitive geometry, or to a table of distances."""
+"""Signed distance to a primitive geometry, or to samples of one."""
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
-from flowborne.kernels.arrays import Array, Integers, Point
+from flowborne.kernels.arrays import Array, Point
 
 SPHERE, CAPSULE, CYLINDER, BOX, ELLIPSOID, MESH = range(6)
+
+
+class Samples(NamedTuple):
+    """Distances on a lattice in the frame of a shape.
+
+    corner  (3,) position of the first sample, m
+    pitch   spacing, m
+    values  (nx, ny, nz) m
+    """
+
+    corner: Array
+    pitch: float
+    values: Array
 
 
 @njit(nogil=True, cache=True, inline="never")
@@ -29,11 +44,10 @@ def distance_to_ellipsoid(x: float, y: float, z: float, a: float, b: float, c: f
 
 
 @njit(nogil=True, cache=True, inline="never")
-def distance_in_table(
-    x: float, y: float, z: float, tables: Array, table: Integers, corner: Array, pitch: float
-) -> float:
-    """Trilinear sample of a table of distances; beyond the table the way to it is added."""
-    n1, n2, n3 = table[1], table[2], table[3]
+def distance_in_samples(x: float, y: float, z: float, samples: Samples) -> float:
+    """Linear between samples of a distance; beyond them the way to them is added."""
+    corner, pitch, values = samples
+    n1, n2, n3 = values.shape
     fx = (x - corner[0]) / pitch
     fy = (y - corner[1]) / pitch
     fz = (z - corner[2]) / pitch
@@ -50,20 +64,12 @@ def distance_in_table(
                 weight = (
                     (tx if di else 1.0 - tx) * (ty if dj else 1.0 - ty) * (tz if dk else 1.0 - tz)
                 )
-                value += weight * tables[table[0] + ((i + di) * n2 + j + dj) * n3 + k + dk]
+                value += weight * values[i + di, j + dj, k + dk]
     return float(value + away)
 
 
 @njit(nogil=True, cache=True)
-def signed_distance(
-    kind: int,
-    size: Array,
-    point: Point,
-    tables: Array,
-    table: Integers,
-    corner: Array,
-    pitch: float,
-) -> float:
+def signed_distance(kind: int, size: Array, point: Point, samples: Samples) -> float:
     """Signed distance of a point in the geometry's frame, negative inside, m."""
     x, y, z = point
     if kind == SPHERE:
@@ -78,21 +84,19 @@ def signed_distance(
         return distance_to_box(x, y, z, size[0], size[1], size[2])
     if kind == ELLIPSOID:
         return distance_to_ellipsoid(x, y, z, size[0], size[1], size[2])
-    return distance_in_table(x, y, z, tables, table, corner, pitch)
+    return distance_in_samples(x, y, z, samples)
 
 
 @njit(nogil=True, cache=True)
 def distances(kind: int, size: Array, points: Array) -> Array:
     """(n,) signed distances of points (n, 3) in the geometry's frame, exact for an ellipsoid, m."""
-    none, nowhere = np.zeros(1), np.zeros(3)
-    table = np.zeros(4, np.int64)
-    distance = np.empty(len(points))
+    none, distance = Samples(np.zeros(3), 1.0, np.zeros((1, 1, 1))), np.empty(len(points))
     for i in range(len(points)):
         if kind == ELLIPSOID:
             distance[i] = distance_off_ellipsoid(points[i], size)
         else:
             point = points[i, 0], points[i, 1], points[i, 2]
-            distance[i] = signed_distance(kind, size, point, none, table, nowhere, 1.0)
+            distance[i] = signed_distance(kind, size, point, none)
     return distance
 
 

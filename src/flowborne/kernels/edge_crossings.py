@@ -15,7 +15,7 @@ import numpy as np
 from numba import njit
 
 from flowborne.kernels.arrays import Array, Indices, Integers, Nodes
-from flowborne.kernels.distance import BOX, CYLINDER, signed_distance
+from flowborne.kernels.distance import BOX, CYLINDER, Samples, signed_distance
 from flowborne.kernels.jit import inlined
 
 PIECES = 1 << 20
@@ -53,19 +53,16 @@ class Crossings(NamedTuple):
 class Placed(NamedTuple):
     """A geometry with a signed distance, see `coupling.shapes`, and where it is.
 
-    kind, size                    of it; (3,)
-    position, rotation            (3,) m; (3, 3) of its frame to the world's
-    tables, table, corner, pitch  of a sampled one
+    kind, size          of it; (3,)
+    position, rotation  (3,) m; (3, 3) of its frame to the world's
+    samples             of one without a formula
     """
 
     kind: int
     size: Array
     position: Array
     rotation: Array
-    tables: Array
-    table: Integers
-    corner: Array
-    pitch: float
+    samples: Samples
 
 
 @inlined
@@ -76,8 +73,7 @@ def distance_to(body: Placed, x: float, y: float, z: float) -> float:
     lx = rotation[0, 0] * dx + rotation[1, 0] * dy + rotation[2, 0] * dz
     ly = rotation[0, 1] * dx + rotation[1, 1] * dy + rotation[2, 1] * dz
     lz = rotation[0, 2] * dx + rotation[1, 2] * dy + rotation[2, 2] * dz
-    sampled = body.tables, body.table, body.corner, body.pitch
-    return signed_distance(body.kind, body.size, (lx, ly, lz), *sampled)
+    return signed_distance(body.kind, body.size, (lx, ly, lz), body.samples)
 
 
 @njit(nogil=True, cache=True)

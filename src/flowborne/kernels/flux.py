@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import prange
 
-from flowborne.kernels.arrays import Array, Faces, Integers, Marks
+from flowborne.kernels.arrays import Array, Faces, Integers, Marks, Three
 from flowborne.kernels.jit import inlined, kernel
 
 GHOSTS = 2
@@ -107,17 +107,17 @@ def side_flux(
 
 @inlined
 def side_row(
-    out: Array, count: int, q: Array, shape: tuple[int, int, int], i: int, j: int, component: int,
-    place: Integers, share: Array, field: Array, marks: Marks, across: tuple[int, int],
+    out: Array, count: int, i: int, j: int, across: tuple[int, int], q: Array, shape: Three,
+    place: Integers, share: Array, component: int, field: Array, marks: Marks,
 ) -> None:  # fmt: skip
     """Flux x value through `count` sides of the control volumes (i, j, :) of a component.
 
     Places are unsigned, and there is one loop: else it is not vectorised.
 
-    q             through the faces of the cells, across the axis of the sides; flat, of this shape
-    place, share  (n, 2) which two of them along the component's axis, and how much of each
     across        where the row above the sides begins in the padded field, and what is between
                   neighbours across them
+    q             through the faces of the cells, across the axis of the sides; flat, of this shape
+    place, share  (n, 2) which two of them along the component's axis, and how much of each
     """
     n1, n2, zero, one = np.uintp(shape[1]), np.uintp(shape[2]), np.uintp(0), np.uintp(1)
     (at, step), line = across, i if component == 0 else (j if component == 1 else one)
@@ -160,41 +160,28 @@ def stage(now: Stage, start: Array, before: Array, padded: Padded, flux: Fluxes)
         bottom = np.uintp(block) * planes
         side, row, net = np.empty(n2 + one), np.empty(n2), np.empty(n2)
         below = np.empty(n1 * n2)
-        x_place, x_share = place[int(component == 0)], share[int(component == 0)]
-        y_place, y_share = place[int(component == 1)], share[int(component == 1)]
-        z_place, z_share = place[int(component == 2)], share[int(component == 2)]
+        carried = component, values, mark
+        x = qx, q[0].shape, place[int(component == 0)], share[int(component == 0)]
+        y = qy, q[1].shape, place[int(component == 1)], share[int(component == 1)]
+        z = qz, q[2].shape, place[int(component == 2)], share[int(component == 2)]
         for i in range(bottom, min(bottom + planes, n0)):
             at = ((i + p) * rows + deep) * wide + deep
-            side_row(
-                row, n2, qy, q[1].shape, i, zero, component, y_place, y_share, values, mark,
-                (at, wide),
-            )  # fmt: skip
+            side_row(row, n2, i, zero, (at, wide), *y, *carried)
             for j in range(n1):
                 at, n, m = ((i + p) * rows + j + deep) * wide + deep, (i * n1 + j) * n2, j * n2
-                side_row(
-                    side, n2 + one, qz, q[2].shape, i, j, component, z_place, z_share, values,
-                    mark, (at, one),
-                )  # fmt: skip
+                side_row(side, n2 + one, i, j, (at, one), *z, *carried)
                 for k in range(n2):
                     net[k] = side[k + one] - side[k] - row[k]
-                side_row(
-                    row, n2, qy, q[1].shape, i, j + one, component, y_place, y_share, values, mark,
-                    (at + wide, wide),
-                )  # fmt: skip
+                side_row(row, n2, i, j + one, (at + wide, wide), *y, *carried)
                 for k in range(n2):
                     net[k] += row[k]
                 if room:
                     if i == bottom:
-                        side_row(
-                            side, n2, qx, q[0].shape, i, j, component, x_place, x_share, values,
-                            mark, (at, rows * wide),
-                        )  # fmt: skip
+                        side_row(side, n2, i, j, (at, rows * wide), *x, *carried)
                         for k in range(n2):
                             below[m + k] = side[k]
-                    side_row(
-                        side, n2, qx, q[0].shape, i + one, j, component, x_place, x_share, values,
-                        mark, (at + rows * wide, rows * wide),
-                    )  # fmt: skip
+                    above = at + rows * wide, rows * wide
+                    side_row(side, n2, i + one, j, above, *x, *carried)
                     for k in range(n2):
                         net[k] += side[k] - below[m + k]
                         below[m + k] = side[k]

@@ -9,25 +9,13 @@ from numba import njit
 
 from flowborne.kernels.arrays import Array, Integers, Mask, Point
 from flowborne.kernels.skin import ON_SKIN
-from flowborne.kernels.triangles import closest_on_triangle, squared_distance
+from flowborne.kernels.triangles import along, closest_on_triangle, crossed, squared_distance
 
 MOST_CELLS = 128.0
 """Cells along the longest side of a body in which its triangles are looked up, at most."""
 
 MOST_LISTED = 64
 """Cells in which a triangle is listed on average, at most; slivers get larger cells."""
-
-
-@njit(nogil=True, cache=True)
-def crossed(a: Point, b: Point) -> Point:
-    """a x b."""
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-@njit(nogil=True, cache=True)
-def along(a: Point, b: Point) -> float:
-    """a . b."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @njit(nogil=True, cache=True)

@@ -46,6 +46,18 @@ def closest_on_triangle(p: Point, a: Point, b: Point, c: Point) -> Point:
 
 
 @njit(nogil=True, cache=True)
+def crossed(a: Point, b: Point) -> Point:
+    """a x b."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@njit(nogil=True, cache=True)
+def along(a: Point, b: Point) -> float:
+    """a . b."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@njit(nogil=True, cache=True)
 def squared_distance(p: Point, a: Point, b: Point, c: Point, weights: Point) -> float:
     """Square of the distance from p to the point of the triangle with the given weights."""
     total = 0.0
@@ -71,13 +83,8 @@ def distances_to_mesh(points: Array, vertices: Array, faces: Integers) -> Array:
             nearest = min(nearest, squared_distance(p, a, b, c, closest))
             u, v, w = a - p, b - p, c - p
             lu, lv, lw = np.sqrt(u.dot(u)), np.sqrt(v.dot(v)), np.sqrt(w.dot(w))
-            triple = (
-                u[0] * (v[1] * w[2] - v[2] * w[1])
-                + u[1] * (v[2] * w[0] - v[0] * w[2])
-                + u[2] * (v[0] * w[1] - v[1] * w[0])
-            )
             below = lu * lv * lw + u.dot(v) * lw + v.dot(w) * lu + w.dot(u) * lv
-            angle += 2.0 * np.arctan2(triple, below)
+            angle += 2.0 * np.arctan2(along(u, crossed(v, w)), below)
         away = np.sqrt(nearest)
         distance[n] = -away if angle > 2.0 * np.pi else away
     return distance
@@ -114,30 +121,25 @@ def _crossings(
     last: Integers,
 ) -> tuple[Integers, Array, Array]:
     lines, places, signs = [np.int64(0)], [0.0], [0.0]
-    p, q = np.empty(3), np.empty(3)
     for t in range(len(triangles)):
         a = vertices[triangles[t, 0]]
         e, f = vertices[triangles[t, 1]] - a, vertices[triangles[t, 2]] - a
-        p[0] = direction[1] * f[2] - direction[2] * f[1]
-        p[1] = direction[2] * f[0] - direction[0] * f[2]
-        p[2] = direction[0] * f[1] - direction[1] * f[0]
-        determinant = e[0] * p[0] + e[1] * p[1] + e[2] * p[2]
+        p = crossed(direction, f)
+        determinant = along(e, p)
         if abs(determinant) < 1e-300:
             continue
         for at in range(first[t], last[t]):
             line = order[at]
-            x, y, z = origins[line, 0] - a[0], origins[line, 1] - a[1], origins[line, 2] - a[2]
-            u = (x * p[0] + y * p[1] + z * p[2]) / determinant
+            gap = origins[line, 0] - a[0], origins[line, 1] - a[1], origins[line, 2] - a[2]
+            u = along(gap, p) / determinant
             if u < 0.0 or u > 1.0:
                 continue
-            q[0] = y * e[2] - z * e[1]
-            q[1] = z * e[0] - x * e[2]
-            q[2] = x * e[1] - y * e[0]
-            v = (q[0] * direction[0] + q[1] * direction[1] + q[2] * direction[2]) / determinant
+            q = crossed(gap, e)
+            v = along(q, direction) / determinant
             if v < 0.0 or u + v >= 1.0:
                 continue
             lines.append(line)
-            places.append((q[0] * f[0] + q[1] * f[1] + q[2] * f[2]) / determinant)
+            places.append(along(q, f) / determinant)
             signs.append(np.sign(determinant))
     return np.array(lines[1:]), np.array(places[1:]), np.array(signs[1:])
 

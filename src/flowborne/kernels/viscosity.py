@@ -13,18 +13,19 @@ import numpy as np
 from numba import njit, prange
 
 from flowborne.kernels.arrays import PERIODIC, PRESCRIBED, Array, Integers, Marks
+from flowborne.kernels.control_volumes import indices
 from flowborne.kernels.cut_faces import closed_face, open_edge, other_axes
 from flowborne.kernels.edge_crossings import Crossings
-from flowborne.kernels.jit import kernel
+from flowborne.kernels.jit import inlined, kernel
 
 INACTIVE, UNKNOWN, GIVEN, TIED = range(4)
 """A face is inside a body, solved for, prescribed by a side, or moves with the body beside it."""
 
-Index = tuple[int, int, int]
-
 LEAST = 1e-3
 """Least distance from a wall and between two faces, and least open part of a cell over that of its
 faces: bounds friction where they are smaller."""
+
+Index = tuple[int, int, int]
 
 SAME = 1e-12
 """Open parts of two faces that differ by less are the same."""
@@ -104,53 +105,24 @@ def find_centres(
 
     centre  (2, ...) from the centre of each face across `axis`, along the other axes, cells
     """
-    _, _, nj, nk = centre.shape
-    for n in range(near.size):
-        f = near[n]
-        i, j, k = f // (nj * nk), (f // nk) % nj, f % nk
+    for f in near:
+        i, j, k = indices(centre.shape[1:], f)
         closed, x, y, _, _, _ = closed_face(distance, crossings, axis, i, j, k, flat, True)
         if 0.0 < closed < 1.0:
             centre[0, i, j, k] = min(max(-x / (1.0 - closed), -0.5), 0.5)
             centre[1, i, j, k] = min(max(-y / (1.0 - closed), -0.5), 0.5)
 
 
-@njit(nogil=True, cache=True)
-def along(one: float, other: float, part: float) -> float:
-    """Link between two faces across the axis they are apart along, over that of open ones.
-
-    one, other  open parts of the faces;  part  that of the cell between them
-    """
-    return one * other / max(part, LEAST * max(one, other))
-
-
-@njit(nogil=True, cache=True)
-def across(
-    distance: Array, crossings: Crossings, centre: Array, axis: int, d: int, f: Index, g: Index
-) -> float:
-    """Link between face f across `axis` and the next one g along d, over that of open ones: the
-    open part of the edge between them over the distance of the centres of their open parts."""
-    i, j, k = f
-    n = int(d == other_axes(axis)[1])
-    part = edge_beside(
-        distance, crossings, axis, d, i + int(d == 0), j + int(d == 1), k + int(d == 2)
-    )
-    return part / max(1.0 + centre[n, g[0], g[1], g[2]] - centre[n, i, j, k], LEAST)
-
-
-@njit(nogil=True, cache=True)
-def edge_beside(
-    distance: Array, crossings: Crossings, axis: int, d: int, i: int, j: int, k: int
-) -> float:
-    """Open part of the edge at the lower side along d of face (i, j, k) across `axis`."""
-    return open_edge(distance, crossings, 3 - axis - d, i, j, k)
-
-
-@kernel
-def following(at: int, count: int, periodic: bool) -> int:
-    """Index after `at` among `count` distinct faces; -1 beyond the domain."""
-    if at + 1 < count:
-        return at + 1
-    return 0 if periodic else -1
+@inlined
+def face_along(face: Index, d: int, step: int, count: int, ring: bool) -> Index:
+    """The face some steps along d from another one, among `count` distinct ones, around a periodic
+    axis; below 0 along d beyond the domain."""
+    at = face[d] + step
+    if ring:
+        at = (at + count) % count
+    elif at >= count:
+        at = -1
+    return at if d == 0 else face[0], at if d == 1 else face[1], at if d == 2 else face[2]
 
 
 @njit(nogil=True, cache=True)
@@ -179,40 +151,46 @@ def link_faces(
 ) -> None:
     """Add the links along d to the system of faces.
 
+    Over that of open faces, the link of two across `axis` is the product of their open parts over
+    that of the cell between them; of two beside each other the open part of the edge between them
+    over the distance of the centres of their open parts.
+
     away      distance to bodies at each face; above 0 where it and its neighbours are uncut
     periodic  whether the domain is along d
     """
     axis, kind, distance, crossings, opened, centre, parts, stiffness = faces
     count = kind.shape[d] - int(periodic and d == axis)
+    m = int(d == other_axes(axis)[1])
     for i in range(kind.shape[0]):
         for j in range(kind.shape[1]):
             for k in range(kind.shape[2]):
-                at = i if d == 0 else (j if d == 1 else k)
-                to = following(at, count, periodic)
-                if at >= count or to < 0:
+                f = i, j, k
+                g = face_along(f, d, 1, count, periodic)
+                if f[d] >= count or g[d] < 0:
                     continue
-                g = to if d == 0 else i, to if d == 1 else j, to if d == 2 else k
-                here, there = kind[i, j, k] == UNKNOWN, kind[g] == UNKNOWN
-                known = kind[i, j, k] == GIVEN or kind[g] == GIVEN
+                here, there = kind[f] == UNKNOWN, kind[g] == UNKNOWN
+                known = kind[f] == GIVEN or kind[g] == GIVEN
                 if not ((here and there) or (known and (here or there))):
                     continue
-                if away[i, j, k] > 0.0:
-                    coefficient = stiffness
-                elif d == axis:
-                    coefficient = stiffness * along(opened[i, j, k], opened[g], parts[i, j, k])
-                else:
-                    between = across(distance, crossings, centre, axis, d, (i, j, k), g)
-                    coefficient = stiffness * between
+                coefficient = stiffness
+                if away[f] <= 0.0 and d == axis:
+                    part = max(parts[f], LEAST * max(opened[f], opened[g]))
+                    coefficient *= opened[f] * opened[g] / part
+                elif away[f] <= 0.0:
+                    above = i + int(d == 0), j + int(d == 1), k + int(d == 2)
+                    part = open_edge(distance, crossings, 3 - axis - d, *above)
+                    apart = 1.0 + centre[m, g[0], g[1], g[2]] - centre[m, i, j, k]
+                    coefficient *= part / max(apart, LEAST)
                 if here:
-                    diagonal[i, j, k] += coefficient
+                    diagonal[f] += coefficient
                 if there:
                     diagonal[g] += coefficient
                 if here and there:
-                    link[i, j, k] = coefficient
+                    link[f] = coefficient
                 elif here:
-                    given[i, j, k] += coefficient * velocity[g]
+                    given[f] += coefficient * velocity[g]
                 else:
-                    given[g] += coefficient * velocity[i, j, k]
+                    given[g] += coefficient * velocity[f]
 
 
 @kernel
@@ -234,36 +212,24 @@ def meet_walls(
     flat = parts.shape[2] == 1
     others = other_axes(axis)
     count = kind.shape[axis] - int(normal[axis, 0] == PERIODIC)
-    step = (int(axis == 0), int(axis == 1), int(axis == 2))
     total, pull = np.zeros(2), np.zeros(2)
     for n in range(beside.size):
-        f = beside[n]
-        i = f // (kind.shape[1] * kind.shape[2])
-        j, k = (f // kind.shape[2]) % kind.shape[1], f % kind.shape[2]
+        i, j, k = f = indices(kind.shape, beside[n])
         # in the plane: the wall that closes a part of the face, and closed faces beside it
         straight = 1.0 - closed_face(distance, crossings, axis, i, j, k, flat, True)[0]
         moment, stuck = 0.0, 0.0
         total[:], pull[:] = 0.0, 0.0
         for m in range(1 if flat else 2):
             d = others[m]
-            periodic = normal[d, 0] == PERIODIC
-            at = i if d == 0 else (j if d == 1 else k)
             for side in (-1, 1):
                 upper = int(side > 0)
-                part = edge_beside(
-                    distance, crossings, axis, d,
-                    i + upper * int(d == 0), j + upper * int(d == 1), k + upper * int(d == 2),
-                )  # fmt: skip
+                edge = i + upper * int(d == 0), j + upper * int(d == 1), k + upper * int(d == 2)
+                part = open_edge(distance, crossings, 3 - axis - d, *edge)
                 away = max(0.5 - side * centre[m, i, j, k], LEAST)
                 total[m] -= side * part
                 moment += part * away
-                to = at + side
-                if periodic:
-                    to = (to + kind.shape[d]) % kind.shape[d]
-                elif to < 0 or to >= kind.shape[d]:
-                    continue
-                g = to if d == 0 else i, to if d == 1 else j, to if d == 2 else k
-                if kind[g] != UNKNOWN and kind[g] != GIVEN:
+                g = face_along(f, d, side, kind.shape[d], normal[d, 0] == PERIODIC)
+                if g[d] >= 0 and kind[g] != UNKNOWN and kind[g] != GIVEN:
                     stuck += part / away
                     pull[m] -= side * part
         size = np.sqrt((total**2).sum())
@@ -277,28 +243,25 @@ def meet_walls(
             pull -= total
         elif straight == 0.0:
             cut = 1.0 / LEAST
-        node[n, 0] = nearest_node(distance, i, j, k, 1 - step[0], 1 - step[1], 1 - step[2])
+        own_nodes = int(axis != 0), int(axis != 1), int(axis != 2)
+        node[n, 0] = nearest_node(distance, i, j, k, *own_nodes)
         if cut + stuck > 0.0:
             wall[n, 0] = stiffness * (cut + stuck)
             for m in range(1 if flat else 2):
                 gap[n, 0, others[m]] = pull[m] / (cut + stuck)
                 place[n, 0, others[m]] = centre[m, i, j, k] - gap[n, 0, others[m]]
         # in the cells: the wall that makes one of two faces smaller than the other
-        at = i if axis == 0 else (j if axis == 1 else k)
         for side in (-1, 1):
-            to, entry = at + side, 1 + int(side > 0)
-            if normal[axis, 0] == PERIODIC:
-                to = (to + count) % count
-            elif to < 0 or to >= count:
+            g = face_along(f, axis, side, count, normal[axis, 0] == PERIODIC)
+            entry = 1 + int(side > 0)
+            if g[axis] < 0:
                 continue
-            g = to if axis == 0 else i, to if axis == 1 else j, to if axis == 2 else k
-            below = at if side > 0 else (at - 1 + count) % count
-            c = below if axis == 0 else i, below if axis == 1 else j, below if axis == 2 else k
+            c = f if side > 0 else g
             active = kind[g] == UNKNOWN or kind[g] == GIVEN
-            own, other = opened[i, j, k], opened[g] if active else 0.0
+            own, other = opened[f], opened[g] if active else 0.0
             if abs(own - other) < SAME:
                 continue
-            node[n, entry] = nearest_node(distance, c[0], c[1], c[2], 1, 1, 1)
+            node[n, entry] = nearest_node(distance, *c, 1, 1, 1)
             weight = own * (own - other) / max(parts[c], LEAST * max(own, other))
             wall[n, entry] = stiffness * weight
             place[n, entry, axis] = 0.5 * side

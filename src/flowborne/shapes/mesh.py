@@ -7,13 +7,13 @@ from functools import cached_property
 import numpy as np
 
 from flowborne.kernels.arrays import Array, Integers, Mesh, Nodes
-from flowborne.kernels.distance import MESH
+from flowborne.kernels.distance import MESH, Samples
 from flowborne.kernels.node_distance import BAND
 from flowborne.kernels.skin import sample_skin
 from flowborne.kernels.thickness import way_inward
 from flowborne.kernels.triangles import Sheets, crossings, distances_to_mesh, lower_to_sheets
 from flowborne.shapes.section import Section, cross
-from flowborne.shapes.shape import DIRECTIONS, FINENESS, Samples, Shape, lattice, unit
+from flowborne.shapes.shape import DIRECTIONS, FINENESS, Shape, lattice, unit
 from flowborne.shapes.thickness import connected, outward, split_quads, thin_parts, thinnest
 
 UNDETERMINED_BELOW = 0.02

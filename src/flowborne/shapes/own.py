@@ -11,10 +11,11 @@ from flowborne.base.errors import PartError
 from flowborne.base.extras import optional
 from flowborne.base.registry import Registry
 from flowborne.kernels.arrays import Array, Integers, Mesh
+from flowborne.kernels.distance import Samples
 from flowborne.kernels.node_distance import BAND, allow_for_curvature
 from flowborne.shapes.mesh import ShapeMesh
 from flowborne.shapes.primitives import PRIMITIVES
-from flowborne.shapes.shape import Samples, Shape, lattice, lattice_points
+from flowborne.shapes.shape import Shape, lattice, lattice_points
 
 SAMPLES_ACROSS = 48
 """Samples along the longest side of a geometry for its triangles."""

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import ClassVar, NamedTuple
+from typing import ClassVar
 
 import numpy as np
 
 from flowborne.kernels.arrays import Array, Integers, Mesh
-from flowborne.kernels.distance import distances
+from flowborne.kernels.distance import Samples, distances
 from flowborne.shapes.section import Section
 from flowborne.shapes.thickness import thin_parts
 
@@ -23,19 +23,6 @@ AROUND = np.array([d for d in np.ndindex(3, 3, 3) if d != (1, 1, 1)], np.float64
 
 DIRECTIONS = AROUND / np.linalg.norm(AROUND, axis=1, keepdims=True)
 """The same as unit vectors."""
-
-
-class Samples(NamedTuple):
-    """Distances on a lattice in the frame of a shape.
-
-    corner  (3,) position of the first sample, m
-    pitch   spacing, m
-    values  (nx, ny, nz) m
-    """
-
-    corner: Array
-    pitch: float
-    values: Array
 
 
 class Shape(ABC):

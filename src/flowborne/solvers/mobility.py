@@ -9,7 +9,6 @@ unknowns that constraints hold. A drag D that grows with the velocity makes it N
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from scipy.sparse import csc_array, csr_array
@@ -57,17 +56,13 @@ class Mobility:
         return float(np.square(self.compliant).sum(axis=1).max(initial=0.0)) or 1.0
 
 
-NONE = np.zeros(0, np.int32)
-START = np.zeros(1, np.int32)
-
-
 def dense_mobility(matrix: Array) -> Mobility:
     """Of a dense A^-1 (k, k)."""
     whole = np.ascontiguousarray(matrix)
     share, axes = np.linalg.eigh(whole) if whole.any() else (np.zeros(len(whole)), whole)
-    none = np.zeros(0, np.int64)
-    blocks = none, none, NONE, none, NONE
-    arrays = whole, START, NONE, np.zeros(0), np.zeros(0), blocks, none, np.zeros((0, 0))
+    none, few, start = np.zeros(0, np.int64), np.zeros(0, np.int32), np.zeros(1, np.int32)
+    blocks = none, none, few, none, few
+    arrays = whole, start, few, np.zeros(0), np.zeros(0), blocks, none, np.zeros((0, 0))
     return Mobility(arrays, axes * np.sqrt(np.maximum(share, 0.0)))
 
 
@@ -93,21 +88,6 @@ Drag = Array | csr_array
 """D, dense for few unknowns."""
 
 
-class Answering(Protocol):
-    """The answer to a drag D (k, k), kg."""
-
-    yields: bool
-    """Whether it moves anything."""
-
-    def change(self, push: Array) -> Array:
-        """(k,) change N J0 of the motion for an impulse J0 (k,) on what keeps its own."""
-        ...
-
-    def to(self, push: Array) -> tuple[Array, Array]:
-        """(k,) the same, and (k,) the impulse J that is felt by what gives way."""
-        ...
-
-
 class DenseAnswer:
     """The answer of few unknowns, however large M or the drag are.
 
@@ -117,6 +97,7 @@ class DenseAnswer:
 
     mobility  (k, k) M, positive semidefinite, 1/kg
     drag      (k, k) D, positive semidefinite, kg
+    yields    whether it moves anything
     """
 
     def __init__(self, mobility: Array, drag: Array) -> None:
@@ -132,11 +113,12 @@ class DenseAnswer:
         self.yields = bool(self.compliance.any())
 
     def change(self, push: Array) -> Array:
-        """See `Answering`; by N (k, k), exactly symmetric."""
+        """(k,) change N J0 of the motion for an impulse J0 (k,) on what keeps its own; N is exactly
+        symmetric."""
         return np.asarray(self.compliance @ push)
 
     def to(self, push: Array) -> tuple[Array, Array]:
-        """See `Answering`."""
+        """(k,) the same, and (k,) the impulse J that is felt by what gives way."""
         z = np.linalg.solve(self.inside.T, np.linalg.solve(self.inside, self.root.T @ push))
         change = self.root @ z
         impulse = self.lift @ z + self.held @ (self.held.T @ (push - self.drag @ change))
@@ -157,10 +139,14 @@ class SparseAnswer:
         self.yields = matrix.shape[0] > 0
 
     def change(self, push: Array) -> Array:
-        """See `Answering`."""
+        """See `DenseAnswer`."""
         return np.asarray(self.jacobian @ self.factor.solve(self.transposed @ push))
 
     def to(self, push: Array) -> tuple[Array, Array]:
-        """See `Answering`."""
+        """See `DenseAnswer`."""
         change = self.change(push)
         return change, push - self.drag @ change
+
+
+Answering = DenseAnswer | SparseAnswer
+"""The answer to a drag."""

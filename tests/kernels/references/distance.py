@@ -4,28 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from flowborne.kernels.arrays import Array, Integers
-from flowborne.kernels.distance import CAPSULE, CYLINDER, ELLIPSOID, MESH, SPHERE
+from flowborne.kernels.arrays import Array
+from flowborne.kernels.distance import CAPSULE, CYLINDER, ELLIPSOID, MESH, SPHERE, Samples
 
 
-def signed_distance_reference(
-    kind: int,
-    size: Array,
-    points: Array,
-    tables: Array,
-    table: Integers,
-    corner: Array,
-    pitch: float,
-) -> Array:
+def signed_distance_reference(kind: int, size: Array, points: Array, samples: Samples) -> Array:
     """(n,) `signed_distance` of points (n, 3) in NumPy."""
     if kind == MESH:
         from scipy.ndimage import map_coordinates  # for this statement alone
 
-        samples = tables[table[0] : table[0] + table[1:].prod()].reshape(table[1:])
-        place = (points - corner) / pitch
-        inside = np.clip(place, 0.0, table[1:] - 1.001)
-        away = pitch * np.linalg.norm(place - inside, axis=1)
-        return np.asarray(map_coordinates(samples, inside.T, order=1) + away)
+        place = (points - samples.corner) / samples.pitch
+        inside = np.clip(place, 0.0, np.array(samples.values.shape) - 1.001)
+        away = samples.pitch * np.linalg.norm(place - inside, axis=1)
+        return np.asarray(map_coordinates(samples.values, inside.T, order=1) + away)
     if kind == ELLIPSOID:
         k0, k1 = (np.linalg.norm(points / size**n, axis=1) for n in (1, 2))
         return np.asarray(k0 * (k0 - 1.0) / k1)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from flowborne.kernels.arrays import Array, Integers
+from flowborne.kernels.distance import Samples
 from flowborne.kernels.node_distance import BAND, FACET, NEAR
 
 from .distance import signed_distance_reference
@@ -27,10 +28,7 @@ def sample_body_reference(
     size: Array,
     position: Array,
     rotation: Array,
-    tables: Array,
-    table: Integers,
-    corner: Array,
-    pitch: Array,
+    samples: Samples,
     origin: Array,
     h: float,
     flat: bool,
@@ -43,10 +41,7 @@ def sample_body_reference(
     phi = np.full(len(x), BAND * h)
     for g in geoms:
         local = (x - position[g]) @ rotation[g]
-        own = signed_distance_reference(
-            kind[g], size[g], local, tables, table[g], corner[g], pitch[g]
-        )
-        phi = np.minimum(phi, own)
+        phi = np.minimum(phi, signed_distance_reference(kind[g], size[g], local, samples))
     return phi.reshape(shape)
 
 
