@@ -8,6 +8,7 @@ import pytest
 from flowborne.kernels.faces import (
     accelerate,
     changes_of_step,
+    largest_open,
     largest_size,
     mean_flux,
     mean_row,

@@ -42,7 +42,7 @@ from flowborne.coupling.world import Fluid, World
 from flowborne.fluid.grid import Grid, copied
 from flowborne.fluid.projection import face_weights, pressure_gradient
 from flowborne.kernels.arrays import ROUNDING, Array, Faces, Integers
-from flowborne.kernels.faces import largest_size
+from flowborne.kernels.faces import largest_open, largest_size
 from flowborne.kernels.projection import open_outflow
 from flowborne.solids.driven import Driven, within_limits
 from flowborne.solids.dynamics import Kinematics
