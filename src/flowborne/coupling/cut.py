@@ -21,6 +21,7 @@ from flowborne.fluid.control_volumes import (
     fluid_momentum,
 )
 from flowborne.fluid.ghosts import edge
+from flowborne.fluid.projection import PressureGradient, pressure_gradient
 from flowborne.fluid.state import FluidState
 from flowborne.fluid.window import Window, moved_fluid
 from flowborne.kernels.arrays import Array, Faces
@@ -137,6 +138,16 @@ def volumes_of(world: World, cut: Geometry) -> ControlVolumes:
     if kept is not None and kept[0] is cut and np.array_equal(kept[1].cells, cells):
         return kept[1]
     return control_volumes(cells, cut.open, fluid.grid, fluid.boundaries)
+
+
+def gradient_on(world: World, cut: Geometry, volumes: ControlVolumes) -> PressureGradient:
+    """The gradient of the pressure on the control volumes of a cut: on those that the last step
+    ended with it is kept."""
+    if world.pressed is not None and world.pressed[0] is volumes:
+        return world.pressed[1]
+    fluid, _ = world.flow()
+    mass = face_masses(volumes, fluid.density)
+    return pressure_gradient(cut.open, mass, fluid.density, fluid.grid, fluid.boundaries)
 
 
 def moved_since(world: World) -> bool:

@@ -22,7 +22,7 @@ from flowborne.coupling.operators import add_bodies, boundary_velocity
 from flowborne.coupling.solve import SolvedFlow
 from flowborne.coupling.world import Fluid, World
 from flowborne.fluid.boundary import cells_in
-from flowborne.fluid.control_volumes import ControlVolumes, control_volumes
+from flowborne.fluid.control_volumes import ControlVolumes, control_volumes, face_masses
 from flowborne.fluid.dye import Dyed, Passage, carry_dye
 from flowborne.fluid.ghosts import edge, impose_sides
 from flowborne.fluid.grid import Grid, copied, faces_of
@@ -55,6 +55,8 @@ class AdvectionResult:
 
 def leak_proof_transport(world: World, start: Departure, end: Geometry, dt: float) -> Transport:
     """Fluxes past the moving bodies, and the control volumes that they lead to at the cut `end`."""
+    if end is not start.cut:
+        world.pressed = None
     flux, cells = leak_proof_flux(world, start, end, dt)
     volumes = control_volumes(cells, end.open, start.fluid.grid, start.fluid.boundaries)
     return Transport(flux, start.volumes, volumes, dt, world.time)
@@ -118,7 +120,7 @@ def advect_momentum(start: Departure, velocity: Faces, transport: Transport) -> 
 
 
 def apply_body_force_and_sides(
-    advected: Faces, opened: Faces, mass: Faces, fluid: Fluid, time: float, dt: float
+    advected: AdvectionResult, opened: Faces, fluid: Fluid, time: float, dt: float
 ) -> Faces:
     """u*: velocity with the body force, driven regions and prescribed sides.
 
@@ -127,8 +129,9 @@ def apply_body_force_and_sides(
     time  s at the end of the step
     """
     grid = fluid.grid
-    velocity = copied(advected, grid)
+    velocity = copied(advected.velocity, grid)
     if any(fluid.body_force):
+        mass = face_masses(advected.volumes, fluid.density)
         rates = accelerated(opened, mass, grid, fluid.boundaries)
         for axis in grid.axes:
             given = dt * fluid.density * fluid.body_force[axis] * grid.spacing

@@ -18,12 +18,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flowborne.coupling.cut import Departure, moved_since
+from flowborne.coupling.cut import Departure, gradient_on, moved_since
 from flowborne.coupling.operators import pressure_push, side_push
 from flowborne.coupling.world import Fluid, World
 from flowborne.fluid.control_volumes import each_once, face_masses, fluid_momentum
 from flowborne.fluid.grid import faces_of
-from flowborne.fluid.projection import pressure_gradient
 from flowborne.kernels.arrays import Array, Faces
 
 
@@ -57,15 +56,15 @@ def explicit_half_pressure(world: World, start: Departure, dt: float) -> HalfPre
     """
     fluid, state = world.flow()
     grid, sides, opened = fluid.grid, fluid.boundaries, start.cut.open
-    mass = face_masses(start.volumes, fluid.density)
     momentum = np.full(3, np.nan)
+    mass = face_masses(start.volumes, fluid.density)
     if world.setup.balances:
         momentum = fluid_momentum(state.velocity, mass, grid, sides)
     size = 6 * world.setup.solid.nbody + start.cut.skins.vertices.size
     if sides.gain_energy(grid) or sea_changes(world, dt) or moved_since(world):
         still = np.zeros(grid.shape), np.zeros(size), np.zeros(3)
         return HalfPressure(state.velocity, *still, momentum)
-    gradient = pressure_gradient(opened, mass, fluid.density, grid, sides)
+    gradient = gradient_on(world, start.cut, start.volumes)
     last, earlier = grid.zeros_faces(), grid.zeros_faces()
     pressure = dynamic_pressure(state.pressure, fluid)
     gradient.subtract(last, pressure, dt)

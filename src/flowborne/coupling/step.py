@@ -55,7 +55,6 @@ from flowborne.coupling.report import Outcome, StepReport, joined, timed
 from flowborne.coupling.solve import solve_together
 from flowborne.coupling.step_report import known_forces, report_coupled, report_failed
 from flowborne.coupling.world import World
-from flowborne.fluid.control_volumes import face_masses
 from flowborne.solids.dynamics import kinematics
 from flowborne.solids.trajectories import JointCommand
 
@@ -111,17 +110,17 @@ def step_coupled(world: World, dt: float, command: JointCommand) -> StepReport:
     cut = cut_by_bodies(world, pose)  # 3
     transport = leak_proof_transport(world, start, cut, dt)  # 4
     advected, dyed = advect(world, start, half.velocity, transport)  # 5
-    mass = face_masses(advected.volumes, fluid.density)
-    driven_sides = far.drive(advected, mass, cut.open, fluid)
-    velocity = apply_body_force_and_sides(driven_sides.velocity, cut.open, mass, fluid, end, dt)
+    driven_sides = far.drive(advected, cut.open, fluid)
+    velocity = apply_body_force_and_sides(driven_sides, cut.open, fluid, end, dt)
     if not all(np.isfinite(velocity[axis]).all() for axis in fluid.grid.axes):
         return report_failed(model, dt, Outcome.ADVECTION_NOT_FINITE)
     with timed("solids"):
         push, known = known_forces(world, pose, half.impulse, advected.jets, dt)
         driven = equations(world, start.bodies, generalised(pose, push), command, dt)
     jets, limit = jets_at(world, cut, end, pose), command.torque_limit
-    solved = solve_together(world, velocity, mass, driven, pose, cut, jets, limit)  # 6
+    volumes = advected.volumes
+    solved = solve_together(world, velocity, volumes, driven, pose, cut, jets, limit)  # 6
     store_state(world, half, advected, dyed, solved, cut, pose)  # 7
     state.wake, state.sea = far.wake, far.velocity
     known |= {"dye_budget_error": dyed.error}
-    return report_coupled(world, dt, pose, mass, half, driven_sides, solved, known)
+    return report_coupled(world, dt, pose, half, driven_sides, solved, known)

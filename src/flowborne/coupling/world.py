@@ -16,6 +16,7 @@ from flowborne.coupling.shapes import Shapes, shapes
 from flowborne.fluid.boundary import Boundaries, Source
 from flowborne.fluid.control_volumes import ControlVolumes
 from flowborne.fluid.grid import Grid
+from flowborne.fluid.projection import PressureGradient
 from flowborne.fluid.state import FluidState, under
 from flowborne.fluid.wake import wake_shape
 from flowborne.fluid.window import Window, crosses
@@ -23,6 +24,7 @@ from flowborne.kernels.arrays import Array
 from flowborne.solids.model import SolidModel, SolidState
 from flowborne.solids.trajectories import NOTHING_TOLD, Told, Trajectory
 from flowborne.solids.wind import Wind
+from flowborne.solvers.pressure import PressureSystem
 
 TRIAL_TOLERANCE = 1e-5
 """Relative residual of the pressure in a hypothetical step: gradients are right to 1e-3."""
@@ -145,6 +147,8 @@ class World:
     volumes the cut that the last step ended with, and its control volumes; likewise
     still   the cut that did not change in the last step, the band of its leak-proof projection, and
             that projection, which a copy makes anew; likewise
+    pressed the control volumes that the last step ended with, the gradient of the pressure on them,
+            and its matrix; likewise
     splitting
             make the added-mass part of forces, for each part of the last step; likewise
     """
@@ -163,10 +167,14 @@ class World:
     still: tuple[Geometry, Band | None, Projection] | None = field(
         default=None, repr=False, compare=False
     )
+    pressed: tuple[ControlVolumes, PressureGradient, PressureSystem] | None = field(
+        default=None, repr=False, compare=False
+    )
     splitting: tuple[Callable[[], Array], ...] = field(default=(), repr=False, compare=False)
 
     def __getstate__(self) -> dict[str, object]:
-        return vars(self) | {"cut": None, "volumes": None, "still": None, "splitting": ()}
+        kept = dict.fromkeys(("cut", "volumes", "still", "pressed"))
+        return vars(self) | kept | {"splitting": ()}
 
     @classmethod
     def at_rest(cls, setup: Setup) -> World:
@@ -192,7 +200,9 @@ class World:
     def copy(self) -> World:
         fluid = None if self.fluid is None else self.fluid.copy()
         memory = {name: values.copy() for name, values in self.memory.items()}
-        return replace(self, solid=self.solid.copy(), fluid=fluid, memory=memory, still=None)
+        copy = replace(self, solid=self.solid.copy(), fluid=fluid, memory=memory)
+        copy.still = copy.pressed = None
+        return copy
 
     def arrays(self) -> dict[str, Array]:
         """The whole state as named arrays; `from_arrays` is the way back, bit for bit."""
