@@ -58,7 +58,9 @@ def leak_proof_transport(world: World, start: Departure, end: Geometry, dt: floa
     if end is not start.cut:
         world.pressed = None
     flux, cells = leak_proof_flux(world, start, end, dt)
-    volumes = control_volumes(cells, end.open, start.fluid.grid, start.fluid.boundaries)
+    volumes = start.volumes
+    if cells is not volumes.cells:
+        volumes = control_volumes(cells, end.open, start.fluid.grid, start.fluid.boundaries)
     return Transport(flux, start.volumes, volumes, dt, world.time)
 
 
@@ -148,6 +150,7 @@ def apply_body_force_and_sides(
 
 def store_state(
     world: World,
+    start: Departure,
     half: HalfPressure,
     advected: AdvectionResult,
     dyed: Dyed,
@@ -155,7 +158,8 @@ def store_state(
     cut: Geometry,
     pose: Kinematics,
 ) -> None:
-    """The state at the end of the step, in place: what was solved for, and what the step changed.
+    """The state at the end of the step, in place: what was solved for, and what the step changed;
+    on faces that bodies cut only where they stand in a trial.
 
     Faces without fluid have the velocity of the leak-proof field; `solved.velocity` gets
     it too, and becomes the state's own. Cells that the solve leaves out have no pressure: no fluid
@@ -164,6 +168,7 @@ def store_state(
     fluid, state = world.flow()
     grid, sides, volumes = fluid.grid, fluid.boundaries, advected.volumes
     dt, velocity = solved.driven.system.dt, solved.velocity
+    stands = world.setup.trial and cut is start.cut
     world.solid.v[:], world.volumes = solved.v, (cut, volumes)
     fill_with_leak_proof(velocity, volumes, cut, boundary_velocity(pose, solved.v), grid)
     volumes.follow(velocity, grid)
@@ -171,8 +176,9 @@ def store_state(
         change, acceleration = state.velocity[axis], state.acceleration[axis]
         passed = half.velocity[axis], advected.velocity[axis]
         changes_of_step(acceleration, change, velocity[axis], *passed, dt)
-        for values in (change, acceleration):
-            values.reshape(-1)[volumes.cut[axis]] = 0.0
+        for values in (acceleration, change):
+            if values is acceleration or not stands:
+                values.reshape(-1)[volumes.cut[axis]] = 0.0
             if sides.periodic()[axis]:
                 values[edge(axis, -1)] = values[edge(axis, 0)]
     state.velocity, state.velocity_change = velocity, state.velocity

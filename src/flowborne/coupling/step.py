@@ -120,7 +120,7 @@ def step_coupled(world: World, dt: float, command: JointCommand) -> StepReport:
     jets, limit = jets_at(world, cut, end, pose), command.torque_limit
     volumes = advected.volumes
     solved = solve_together(world, velocity, volumes, driven, pose, cut, jets, limit)  # 6
-    store_state(world, half, advected, dyed, solved, cut, pose)  # 7
+    store_state(world, start, half, advected, dyed, solved, cut, pose)  # 7
     state.wake, state.sea = far.wake, far.velocity
     known |= {"dye_budget_error": dyed.error}
     return report_coupled(world, dt, pose, half, driven_sides, solved, known)
