@@ -30,16 +30,18 @@ from flowborne.solids.model import SolidModel, SolidState
 
 
 @timed("geometry")
-def cut_by_bodies(world: World, pose: Kinematics | None = None) -> Geometry:
-    """The grid cut by the bodies at their positions: once for each pose, and kept in the world.
-
-    pose  of the bodies at these positions, if it is known
-    """
+def pose_and_cut(world: World) -> tuple[Kinematics, Geometry]:
+    """The bodies and the cut grid at their positions: once for each, and kept in the world."""
     if world.cut is None or not np.array_equal(world.cut[0], world.solid.q):
-        if pose is None:
+        with timed("solids"):
             pose = kinematics(world.setup.solid, world.solid.q)
-        world.cut = world.solid.q.copy(), cut_at(world.setup, pose)
-    return world.cut[1]
+        world.cut = world.solid.q.copy(), pose, cut_at(world.setup, pose)
+    return world.cut[1:]
+
+
+def cut_by_bodies(world: World) -> Geometry:
+    """The grid cut by the bodies at their positions."""
+    return pose_and_cut(world)[1]
 
 
 def cut_at(setup: Setup, pose: Kinematics) -> Geometry:
@@ -58,9 +60,7 @@ def cut_at(setup: Setup, pose: Kinematics) -> Geometry:
     )
 
 
-def jets_at(
-    world: World, cut: Geometry, time: float, pose: Kinematics | None = None
-) -> tuple[Jet, ...]:
+def jets_at(world: World, time: float) -> tuple[Jet, ...]:
     """What the mouths expel at `time` (s) with the bodies at their positions.
 
     raises  ValueError when a mouth covers no cell
@@ -68,8 +68,7 @@ def jets_at(
     setup = world.setup
     if not setup.mouths:
         return ()
-    if pose is None:
-        pose = kinematics(setup.solid, world.solid.q)
+    pose, cut = pose_and_cut(world)
     given = cut, pose, world.solid.v, world.flow()[0].grid, time
     return tuple(jet_of(mouth, *given) for mouth in setup.mouths)
 
@@ -122,7 +121,7 @@ def departure(world: World) -> Departure:
     """Fluid and bodies at the start of a step."""
     fluid, state = world.flow()
     cut = cut_by_bodies(world)
-    jets, sources = jets_at(world, cut, world.time), source_rate(fluid, world.time, cut.open)
+    jets, sources = jets_at(world, world.time), source_rate(fluid, world.time, cut.open)
     rate = sources.copy()
     add_rates(rate, jets)
     volumes, bodies = volumes_of(world, cut), world.solid.copy()

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from flowborne.coupling.cut import Departure, moved_since
+from flowborne.coupling.cut import Departure, moved_since, pose_and_cut
 from flowborne.coupling.flow import AdvectionResult
 from flowborne.coupling.operators import boundary_velocity, leak_proof
 from flowborne.coupling.world import Fluid, World
@@ -26,7 +26,6 @@ from flowborne.fluid.potential import Normal, brought
 from flowborne.fluid.projection import accelerated
 from flowborne.fluid.wake import induced
 from flowborne.kernels.arrays import Array, Faces
-from flowborne.solids.dynamics import kinematics
 
 
 @dataclass(frozen=True)
@@ -90,7 +89,7 @@ def far_field(world: World, start: Departure, dt: float) -> FarField:
             for place in sea.driven
         }
         return FarField(kept, state.wake, velocity, gained)
-    moving = boundary_velocity(kinematics(world.setup.solid, start.bodies.q), start.bodies.v)
+    moving = boundary_velocity(pose_and_cut(world)[0], start.bodies.v)
     field = leak_proof(state.velocity, start.cut, moving, fluid.grid)
     normal, wake = induced(field, sea, state.wake, dt)
     for place, values in brought(field, sea).items():

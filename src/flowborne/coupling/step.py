@@ -40,7 +40,7 @@ from flowborne.coupling.bodies_step import (
     position_velocity,
     step_bodies,
 )
-from flowborne.coupling.cut import cut_by_bodies, departure, follow, jets_at
+from flowborne.coupling.cut import departure, follow, jets_at, pose_and_cut
 from flowborne.coupling.drives import joint_command
 from flowborne.coupling.far_field import far_field
 from flowborne.coupling.flow import (
@@ -55,7 +55,6 @@ from flowborne.coupling.report import Outcome, StepReport, joined, timed
 from flowborne.coupling.solve import solve_together
 from flowborne.coupling.step_report import known_forces, report_coupled, report_failed
 from flowborne.coupling.world import World
-from flowborne.solids.dynamics import kinematics
 from flowborne.solids.trajectories import JointCommand
 
 
@@ -106,8 +105,7 @@ def step_coupled(world: World, dt: float, command: JointCommand) -> StepReport:
     half = explicit_half_pressure(world, start, dt)  # 1
     with timed("solids"):
         move_bodies(world, command, dt)  # 2
-        pose = kinematics(model, world.solid.q)
-    cut = cut_by_bodies(world, pose)  # 3
+    pose, cut = pose_and_cut(world)  # 3
     transport = leak_proof_transport(world, start, cut, dt)  # 4
     advected, dyed = advect(world, start, half.velocity, transport)  # 5
     driven_sides = far.drive(advected, cut.open, fluid)
@@ -117,7 +115,7 @@ def step_coupled(world: World, dt: float, command: JointCommand) -> StepReport:
     with timed("solids"):
         push, known = known_forces(world, pose, half.impulse, advected.jets, dt)
         driven = equations(world, start.bodies, generalised(pose, push), command, dt)
-    jets, limit = jets_at(world, cut, end, pose), command.torque_limit
+    jets, limit = jets_at(world, end), command.torque_limit
     volumes = advected.volumes
     solved = solve_together(world, velocity, volumes, driven, pose, cut, jets, limit)  # 6
     store_state(world, start, half, advected, dyed, solved, cut, pose)  # 7

@@ -21,6 +21,7 @@ from flowborne.fluid.state import FluidState, under
 from flowborne.fluid.wake import wake_shape
 from flowborne.fluid.window import Window, crosses
 from flowborne.kernels.arrays import Array
+from flowborne.solids.dynamics import Kinematics
 from flowborne.solids.model import SolidModel, SolidState
 from flowborne.solids.trajectories import NOTHING_TOLD, Told, Trajectory
 from flowborne.solids.wind import Wind
@@ -142,8 +143,8 @@ class World:
     parts   most parts that a step of the world itself has been divided into, see `bodies_step`
     memory  the controller's own arrays, by name
     told    what joints are told from outside in this frame: not part of the state
-    cut     the positions (nq,) for which the grid was cut last, and that cut: made from the state,
-            and not part of it
+    cut     the positions (nq,) for which the grid was cut last, the bodies there, and that cut:
+            made from the state, and not part of it
     volumes the cut that the last step ended with, and its control volumes; likewise
     still   the cut that did not change in the last step, the band of its leak-proof projection, and
             that projection, which a copy makes anew; likewise
@@ -162,7 +163,7 @@ class World:
     parts: int = 1
     memory: dict[str, Array] = field(default_factory=dict)
     told: Told = NOTHING_TOLD
-    cut: tuple[Array, Geometry] | None = field(default=None, repr=False, compare=False)
+    cut: tuple[Array, Kinematics, Geometry] | None = field(default=None, repr=False, compare=False)
     volumes: tuple[Geometry, ControlVolumes] | None = field(default=None, repr=False, compare=False)
     still: tuple[Geometry, Band | None, Projection] | None = field(
         default=None, repr=False, compare=False
