@@ -109,7 +109,7 @@ def test_body_fluid_and_what_fills_the_body_keep_their_momentum(
     mass, dt = float(world.setup.solid.body_mass.sum()), 0.02
     for _ in range(8):
         was, velocity = momentum_of(world), world.solid.v[:3].copy()
-        (jet,) = jets_at(world, cut_by_bodies(world), world.time)
+        (jet,) = jets_at(world, world.time)
         report = step(world, dt)
         assert report.outcome.name == "DONE"
         thrust = dt * report.jet_wrench[1, :3]
@@ -229,7 +229,7 @@ def test_nothing_is_blown_out_of_the_far_side_of_a_thin_plate() -> None:
     mouth = Mouth("the mouth", 1, (0.05, 0.0, 0.0), (1.0, 0.0, 0.0), 0.1, RATE, FactorSteady())
     world = World.at_rest(replace(world.setup, mouths=(mouth,)))
     cut, grid = cut_by_bodies(world), world.flow()[0].grid
-    (jet,) = jets_at(world, cut, 0.0)
+    (jet,) = jets_at(world, 0.0)
     cells = np.stack(np.unravel_index(jet.cells, grid.shape), axis=1)
     assert (grid.cell_coordinates()[0][cells[:, 0]] > 0.0).all()
     blown = share_of(cut.closed.place, mouth, jet.centre, jet.along, cut, grid) > 0.0

@@ -70,7 +70,7 @@ def disc_world(cells):
 @pytest.mark.parametrize(("cells", "error"), [(32, 4e-3), (64, 1e-3)])
 def test_open_cells_leave_out_the_area_of_a_disc(cells, error):
     world = disc_world(cells)
-    part = open_cells(world, kinematics(world.setup.solid, world.solid.q))
+    part = open_cells(world)
     assert part.shape == (cells, cells, 1)
     assert part.min() == 0.0
     closed = (1.0 - part).sum() * world.setup.fluid.grid.cell_volume

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from flowborne.coupling.cut import pose_and_cut
 from flowborne.coupling.drives import joint_command
 from flowborne.coupling.operators import cross, generalised, twists
 from flowborne.coupling.report import StepReport, timed
@@ -91,10 +92,10 @@ def advance_prescribed(world: World, dt: float, command: JointCommand) -> bool:
 def parts_of(world: World, velocity: Array, dt: float) -> int:
     """Number of parts of a step in which the bodies move with `velocity` (nv,) for `dt` (s): no
     point of them crosses more than a cell in a part."""
-    fluid, model = world.setup.fluid, world.setup.solid
+    fluid = world.setup.fluid
     if fluid is None or fluid.one_way or not velocity.any():
         return 1
-    pose, fastest = kinematics(model, world.solid.q), 0.0
+    (pose, _), fastest = pose_and_cut(world), 0.0
     shapes = world.setup.shapes
     if shapes.body.size:
         turned = np.einsum("gij,gkj->gki", pose.geom_rotation[shapes.source], shapes.tips)

@@ -21,6 +21,7 @@ from flowborne.fluid.control_volumes import (
     fluid_momentum,
 )
 from flowborne.fluid.ghosts import edge
+from flowborne.fluid.projection import PressureGradient, pressure_gradient
 from flowborne.fluid.state import FluidState
 from flowborne.fluid.window import Window, moved_fluid
 from flowborne.kernels.arrays import Array, Faces
@@ -29,16 +30,18 @@ from flowborne.solids.model import SolidModel, SolidState
 
 
 @timed("geometry")
-def cut_by_bodies(world: World, pose: Kinematics | None = None) -> Geometry:
-    """The grid cut by the bodies at their positions: once for each pose, and kept in the world.
-
-    pose  of the bodies at these positions, if it is known
-    """
+def pose_and_cut(world: World) -> tuple[Kinematics, Geometry]:
+    """The bodies and the cut grid at their positions: once for each, and kept in the world."""
     if world.cut is None or not np.array_equal(world.cut[0], world.solid.q):
-        if pose is None:
+        with timed("solids"):
             pose = kinematics(world.setup.solid, world.solid.q)
-        world.cut = world.solid.q.copy(), cut_at(world.setup, pose)
-    return world.cut[1]
+        world.cut = world.solid.q.copy(), pose, cut_at(world.setup, pose)
+    return world.cut[1:]
+
+
+def cut_by_bodies(world: World) -> Geometry:
+    """The grid cut by the bodies at their positions."""
+    return pose_and_cut(world)[1]
 
 
 def cut_at(setup: Setup, pose: Kinematics) -> Geometry:
@@ -57,9 +60,7 @@ def cut_at(setup: Setup, pose: Kinematics) -> Geometry:
     )
 
 
-def jets_at(
-    world: World, cut: Geometry, time: float, pose: Kinematics | None = None
-) -> tuple[Jet, ...]:
+def jets_at(world: World, time: float) -> tuple[Jet, ...]:
     """What the mouths expel at `time` (s) with the bodies at their positions.
 
     raises  ValueError when a mouth covers no cell
@@ -67,8 +68,7 @@ def jets_at(
     setup = world.setup
     if not setup.mouths:
         return ()
-    if pose is None:
-        pose = kinematics(setup.solid, world.solid.q)
+    pose, cut = pose_and_cut(world)
     given = cut, pose, world.solid.v, world.flow()[0].grid, time
     return tuple(jet_of(mouth, *given) for mouth in setup.mouths)
 
@@ -121,7 +121,7 @@ def departure(world: World) -> Departure:
     """Fluid and bodies at the start of a step."""
     fluid, state = world.flow()
     cut = cut_by_bodies(world)
-    jets, sources = jets_at(world, cut, world.time), source_rate(fluid, world.time, cut.open)
+    jets, sources = jets_at(world, world.time), source_rate(fluid, world.time, cut.open)
     rate = sources.copy()
     add_rates(rate, jets)
     volumes, bodies = volumes_of(world, cut), world.solid.copy()
@@ -139,6 +139,16 @@ def volumes_of(world: World, cut: Geometry) -> ControlVolumes:
         if known is cells or np.array_equal(known, cells):
             return kept[1]
     return control_volumes(cells, cut.open, fluid.grid, fluid.boundaries)
+
+
+def gradient_on(world: World, cut: Geometry, volumes: ControlVolumes) -> PressureGradient:
+    """The gradient of the pressure on the control volumes of a cut: on those that the last step
+    ended with it is kept."""
+    if world.pressed is not None and world.pressed[0] is volumes:
+        return world.pressed[1]
+    fluid, _ = world.flow()
+    mass = face_masses(volumes, fluid.density)
+    return pressure_gradient(cut.open, mass, fluid.density, fluid.grid, fluid.boundaries)
 
 
 def moved_since(world: World) -> bool:

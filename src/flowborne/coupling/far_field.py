@@ -16,16 +16,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from flowborne.coupling.cut import Departure, moved_since
+from flowborne.coupling.cut import Departure, moved_since, pose_and_cut
 from flowborne.coupling.flow import AdvectionResult
 from flowborne.coupling.operators import boundary_velocity, leak_proof
 from flowborne.coupling.world import Fluid, World
+from flowborne.fluid.control_volumes import face_masses
 from flowborne.fluid.grid import faces_of
 from flowborne.fluid.potential import Normal, brought
 from flowborne.fluid.projection import accelerated
 from flowborne.fluid.wake import induced
 from flowborne.kernels.arrays import Array, Faces
-from flowborne.solids.dynamics import kinematics
 
 
 @dataclass(frozen=True)
@@ -43,15 +43,13 @@ class FarField:
     velocity: Array
     gained: Array
 
-    def drive(
-        self, advected: AdvectionResult, mass: Faces, opened: Faces, fluid: Fluid
-    ) -> AdvectionResult:
+    def drive(self, advected: AdvectionResult, opened: Faces, fluid: Fluid) -> AdvectionResult:
         """The fluid after advection where the sides have their velocity; what that took they gave.
 
         Where the sea's velocity changes, its pressure acts at the end of the columns behind the
         sides, so that a uniform flow changes alike.
 
-        mass, opened  of the faces at the end of the step, kg and open parts
+        opened  Faces, open parts at the end of the step
         """
         grid, sea = fluid.grid, fluid.boundaries.sea(fluid.grid)
         if sea is None:
@@ -60,6 +58,7 @@ class FarField:
         for place, across in self.normal.items():
             velocity[place.axis][place.layer] = across
         if self.gained.any():
+            mass = face_masses(advected.volumes, fluid.density)
             rate = accelerated(opened, mass, grid, fluid.boundaries)
             for place in sea.far:
                 outward, at = 1.0 if place.upper else -1.0, list(place.cell_coordinates())
@@ -71,7 +70,8 @@ class FarField:
                 )
         for place in sea.far:
             change = (velocity[place.axis] - advected.velocity[place.axis])[place.layer]
-            stopped[place.axis] += float((mass[place.axis][place.layer] * change).sum())
+            held = fluid.density * advected.volumes.moving[place.axis][place.layer]
+            stopped[place.axis] += float((held * change).sum())
         return replace(advected, velocity=velocity, stopped=stopped)
 
 
@@ -89,7 +89,7 @@ def far_field(world: World, start: Departure, dt: float) -> FarField:
             for place in sea.driven
         }
         return FarField(kept, state.wake, velocity, gained)
-    moving = boundary_velocity(kinematics(world.setup.solid, start.bodies.q), start.bodies.v)
+    moving = boundary_velocity(pose_and_cut(world)[0], start.bodies.v)
     field = leak_proof(state.velocity, start.cut, moving, fluid.grid)
     normal, wake = induced(field, sea, state.wake, dt)
     for place, values in brought(field, sea).items():

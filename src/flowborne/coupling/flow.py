@@ -22,7 +22,7 @@ from flowborne.coupling.operators import boundary_velocity, carried_at
 from flowborne.coupling.solve import SolvedFlow
 from flowborne.coupling.world import Fluid, World
 from flowborne.fluid.boundary import cells_in
-from flowborne.fluid.control_volumes import ControlVolumes, control_volumes
+from flowborne.fluid.control_volumes import ControlVolumes, control_volumes, face_masses
 from flowborne.fluid.dye import Dyed, Passage, carry_dye
 from flowborne.fluid.ghosts import edge, impose_sides
 from flowborne.fluid.grid import copied, faces_of
@@ -56,8 +56,12 @@ class AdvectionResult:
 
 def leak_proof_transport(world: World, start: Departure, end: Geometry, dt: float) -> Transport:
     """Fluxes past the moving bodies, and the control volumes that they lead to at the cut `end`."""
+    if end is not start.cut:
+        world.pressed = None
     flux, cells = leak_proof_flux(world, start, end, dt)
-    volumes = control_volumes(cells, end.open, start.fluid.grid, start.fluid.boundaries)
+    volumes = start.volumes
+    if cells is not volumes.cells:
+        volumes = control_volumes(cells, end.open, start.fluid.grid, start.fluid.boundaries)
     return Transport(flux, start.volumes, volumes, dt, world.time)
 
 
@@ -121,7 +125,7 @@ def advect_momentum(start: Departure, velocity: Faces, transport: Transport) -> 
 
 
 def apply_body_force_and_sides(
-    advected: Faces, opened: Faces, mass: Faces, fluid: Fluid, time: float, dt: float
+    advected: AdvectionResult, opened: Faces, fluid: Fluid, time: float, dt: float
 ) -> Faces:
     """u*: velocity with the body force, driven regions and prescribed sides.
 
@@ -130,8 +134,9 @@ def apply_body_force_and_sides(
     time  s at the end of the step
     """
     grid = fluid.grid
-    velocity = copied(advected, grid)
+    velocity = copied(advected.velocity, grid)
     if any(fluid.body_force):
+        mass = face_masses(advected.volumes, fluid.density)
         rates = accelerated(opened, mass, grid, fluid.boundaries)
         for axis in grid.axes:
             given = dt * fluid.density * fluid.body_force[axis] * grid.spacing
@@ -148,6 +153,7 @@ def apply_body_force_and_sides(
 
 def store_state(
     world: World,
+    start: Departure,
     half: HalfPressure,
     advected: AdvectionResult,
     dyed: Dyed,
@@ -155,7 +161,8 @@ def store_state(
     cut: Geometry,
     pose: Kinematics,
 ) -> None:
-    """The state at the end of the step, in place: what was solved for, and what the step changed.
+    """The state at the end of the step, in place: what was solved for, and what the step changed;
+    on faces that bodies cut only where they stand in a trial.
 
     Faces without fluid have the velocity of the leak-proof field; `solved.velocity` gets
     it too, and becomes the state's own. Cells that the solve leaves out have no pressure: no fluid
@@ -164,6 +171,7 @@ def store_state(
     fluid, state = world.flow()
     grid, sides, volumes = fluid.grid, fluid.boundaries, advected.volumes
     dt, velocity = solved.driven.system.dt, solved.velocity
+    stands = world.setup.trial and cut is start.cut
     world.solid.v[:], world.volumes = solved.v, (cut, volumes)
     fill_with_leak_proof(velocity, volumes, cut, boundary_velocity(pose, solved.v), fluid)
     volumes.follow(velocity, grid)
@@ -171,8 +179,9 @@ def store_state(
         change, acceleration = state.velocity[axis], state.acceleration[axis]
         passed = half.velocity[axis], advected.velocity[axis]
         changes_of_step(acceleration, change, velocity[axis], *passed, dt)
-        for values in (change, acceleration):
-            values.reshape(-1)[volumes.cut[axis]] = 0.0
+        for values in (acceleration, change):
+            if values is acceleration or not stands:
+                values.reshape(-1)[volumes.cut[axis]] = 0.0
             if sides.periodic()[axis]:
                 values[edge(axis, -1)] = values[edge(axis, 0)]
     state.velocity, state.velocity_change = velocity, state.velocity

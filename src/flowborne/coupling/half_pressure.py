@@ -18,12 +18,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flowborne.coupling.cut import Departure, moved_since
+from flowborne.coupling.cut import Departure, gradient_on, moved_since
 from flowborne.coupling.operators import pressure_push, side_push
 from flowborne.coupling.world import Fluid, World
-from flowborne.fluid.control_volumes import each_once, face_masses, fluid_momentum
+from flowborne.fluid.control_volumes import each_once, fluid_momentum
 from flowborne.fluid.grid import faces_of
-from flowborne.fluid.projection import pressure_gradient
 from flowborne.kernels.arrays import Array, Faces
 
 
@@ -57,25 +56,23 @@ def explicit_half_pressure(world: World, start: Departure, dt: float) -> HalfPre
     """
     fluid, state = world.flow()
     grid, sides, opened = fluid.grid, fluid.boundaries, start.cut.open
-    momentum = np.full(3, np.nan)
+    momentum, volumes = np.full(3, np.nan), start.volumes.moving
     if world.setup.balances:
-        volumes = start.volumes.moving
         momentum = fluid.density * fluid_momentum(state.velocity, volumes, grid, sides)
     size = 6 * world.setup.solid.nbody + start.cut.skins.vertices.size
     if sides.gain_energy(grid) or sea_changes(world, dt) or moved_since(world):
         still = np.zeros(grid.shape), np.zeros(size), np.zeros(3)
         return HalfPressure(state.velocity, *still, momentum)
-    mass = face_masses(start.volumes, fluid.density)
-    gradient = pressure_gradient(opened, mass, fluid.density, grid, sides)
+    gradient = gradient_on(world, start.cut, start.volumes)
     last, earlier = grid.zeros_faces(), grid.zeros_faces()
     pressure = dynamic_pressure(state.pressure, fluid)
     gradient.subtract(last, pressure, dt)
     before = dynamic_pressure(state.previous_pressure, fluid)
     gradient.subtract(earlier, before, dt)
     own = [each_once(axis, sides) for axis in range(3)]
-    fields = list(zip(own, mass, last, earlier, strict=True))
-    both = sum(float((m * k * b)[once].sum()) for once, m, k, b in fields)
-    square = sum(float((m * k * k)[once].sum()) for once, m, k, _ in fields)
+    fields = list(zip(own, volumes, last, earlier, strict=True))
+    both = sum(float((v * k * b)[once].sum()) for once, v, k, b in fields)
+    square = sum(float((v * k * k)[once].sum()) for once, v, k, _ in fields)
     part = 0.5 * pressure_increment_ratio(both / square) if square > 0.0 else 0.0
     half = part * pressure
     state.pressure -= half

@@ -24,7 +24,7 @@ from functools import partial
 
 import numpy as np
 
-from flowborne.coupling.cut import source_rate
+from flowborne.coupling.cut import gradient_on, source_rate
 from flowborne.coupling.fractions import Geometry
 from flowborne.coupling.mouths import Jet, add_rates
 from flowborne.coupling.operators import (
@@ -39,8 +39,9 @@ from flowborne.coupling.operators import (
 from flowborne.coupling.report import Outcome, timed
 from flowborne.coupling.viscous_solve import diffuse
 from flowborne.coupling.world import Fluid, World
+from flowborne.fluid.control_volumes import ControlVolumes, face_masses
 from flowborne.fluid.grid import Grid, copied
-from flowborne.fluid.projection import face_weights, pressure_gradient
+from flowborne.fluid.projection import PressureGradient, face_weights
 from flowborne.kernels.arrays import ROUNDING, Array, Faces, Integers
 from flowborne.kernels.faces import largest_open, largest_size
 from flowborne.kernels.projection import open_outflow
@@ -87,6 +88,7 @@ class SolvedFlow(Solved):
     """The same with the fluid's. Impulses (k,) on bodies are wrenches about the world origin, then
     forces on vertices of flesh, N s and N m s.
 
+    mass             Faces, of the fluid that pressure on each face accelerates, kg
     viscous_impulse  (k,)
     added_mass       (k,) the part of `impulse` of `added_mass_impulse`, or what gives it; nan in
                      trials
@@ -101,6 +103,7 @@ class SolvedFlow(Solved):
     fastest          largest |u+| on an open face, m/s; likewise
     """
 
+    mass: Faces
     viscous_impulse: Array
     added_mass: Array | Callable[[], Array]
     before_pressure: Faces
@@ -155,7 +158,7 @@ def solve_bodies(driven: Driven, torque_limit: Array) -> Solved:
 def solve_together(
     world: World,
     velocity: Faces,
-    mass: Faces,
+    volumes: ControlVolumes,
     driven: Driven,
     pose: Kinematics,
     cut: Geometry,
@@ -165,19 +168,15 @@ def solve_together(
     """Viscosity, pressure and bodies at the end of the step (section 6, item 6).
 
     velocity  Faces u*, m/s, after advection and forces
-    mass      Faces, of the fluid that pressure on each face accelerates, kg
+    volumes   control volumes at the end of the step
     jets      of the mouths at the end of the step
     returns   velocity without divergence on the open parts of the faces, the bodies' velocity
               with driven dofs exactly at their targets, and what each gave to the other
     """
     dt = driven.system.dt
     fluid, state = world.flow()
-    gradient = pressure_gradient(cut.open, mass, fluid.density, fluid.grid, fluid.boundaries)
-    weights = face_weights(cut.open, gradient.rate, fluid.grid)
-    beyond = beyond_sides(gradient.dipoles, fluid.grid.face_area * gradient.whole)
-    mobility = driven.mobility(pose)
-    yielding = give_way(cut, mobility, fluid.grid)
-    matrix = PressureSystem(weights, fluid.boundaries.periodic(), yielding, beyond)
+    mass, mobility = face_masses(volumes, fluid.density), driven.mobility(pose)
+    gradient, matrix = pressure_on(world, volumes, cut, mobility)
     pressure = dt * state.pressure
     tolerance = fluid.tolerance
     if correct_under(pressure, cut, pose, driven, torque_limit) is not None:
@@ -221,7 +220,7 @@ def solve_together(
     if not solution.converged:
         outcome = Outcome.PRESSURE_NOT_CONVERGED
     change = boundary_velocity(pose, v - driven.system.v)
-    plain = partial(PressureSystem, weights, fluid.boundaries.periodic(), beyond=beyond)
+    plain = partial(pressure_system, gradient, cut.open)
     added_mass: Array | Callable[[], Array] = partial(added_mass_impulse, plain, cut, change)
     divergence = fastest = np.nan
     if world.setup.balances:
@@ -231,13 +230,15 @@ def solve_together(
     else:
         added_mass = np.full(change.size, np.nan)
     if world.setup.splits:
-        added_mass = added_mass_impulse(plain if yielding.size else lambda: matrix, cut, change)
+        own = (lambda: matrix) if mobility.is_dense else plain
+        added_mass = added_mass_impulse(own, cut, change)
     return SolvedFlow(
         driven,
         v,
         actuator,
         outcome,
         left,
+        mass=mass,
         viscous_impulse=viscous,
         added_mass=added_mass,
         before_pressure=smooth,
@@ -250,6 +251,29 @@ def solve_together(
         divergence=divergence,
         fastest=fastest,
     )
+
+
+def pressure_on(
+    world: World, volumes: ControlVolumes, cut: Geometry, mobility: Mobility
+) -> tuple[PressureGradient, PressureSystem]:
+    """Gradient and matrix of the pressure: those of the last step where volumes stay."""
+    if world.pressed is None or world.pressed[0] is not volumes:
+        world.pressed, grid = None, world.flow()[0].grid
+        gradient, yielding = gradient_on(world, cut, volumes), give_way(cut, mobility, grid)
+        matrix = pressure_system(gradient, cut.open, yielding)
+        if yielding.size:
+            return gradient, matrix
+        world.pressed = volumes, gradient, matrix
+    return world.pressed[1:]
+
+
+def pressure_system(
+    gradient: PressureGradient, opened: Faces, reaction: Array = NO_REACTION
+) -> PressureSystem:
+    """K on faces of these open parts; see `PressureSystem`."""
+    weights = face_weights(opened, gradient.rate, gradient.grid)
+    beyond = beyond_sides(gradient.dipoles, gradient.grid.face_area * gradient.whole)
+    return PressureSystem(weights, gradient.boundaries.periodic(), reaction, beyond)
 
 
 def added_mass_impulse(matrix: Callable[[], PressureSystem], cut: Geometry, change: Array) -> Array:

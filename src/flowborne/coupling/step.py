@@ -40,7 +40,7 @@ from flowborne.coupling.bodies_step import (
     position_velocity,
     step_bodies,
 )
-from flowborne.coupling.cut import cut_by_bodies, departure, follow, jets_at
+from flowborne.coupling.cut import departure, follow, jets_at, pose_and_cut
 from flowborne.coupling.drives import joint_command
 from flowborne.coupling.far_field import far_field
 from flowborne.coupling.flow import (
@@ -55,8 +55,6 @@ from flowborne.coupling.report import Outcome, StepReport, joined, timed
 from flowborne.coupling.solve import solve_together
 from flowborne.coupling.step_report import known_forces, report_coupled, report_failed
 from flowborne.coupling.world import World
-from flowborne.fluid.control_volumes import face_masses
-from flowborne.solids.dynamics import kinematics
 from flowborne.solids.trajectories import JointCommand
 
 
@@ -107,21 +105,20 @@ def step_coupled(world: World, dt: float, command: JointCommand) -> StepReport:
     half = explicit_half_pressure(world, start, dt)  # 1
     with timed("solids"):
         move_bodies(world, command, dt)  # 2
-        pose = kinematics(model, world.solid.q)
-    cut = cut_by_bodies(world, pose)  # 3
+    pose, cut = pose_and_cut(world)  # 3
     transport = leak_proof_transport(world, start, cut, dt)  # 4
     advected, dyed = advect(world, start, half.velocity, transport)  # 5
-    mass = face_masses(advected.volumes, fluid.density)
-    driven_sides = far.drive(advected, mass, cut.open, fluid)
-    velocity = apply_body_force_and_sides(driven_sides.velocity, cut.open, mass, fluid, end, dt)
+    driven_sides = far.drive(advected, cut.open, fluid)
+    velocity = apply_body_force_and_sides(driven_sides, cut.open, fluid, end, dt)
     if not all(np.isfinite(velocity[axis]).all() for axis in fluid.grid.axes):
         return report_failed(model, dt, Outcome.ADVECTION_NOT_FINITE)
     with timed("solids"):
         push, known = known_forces(world, pose, half.impulse, advected.jets, dt)
         driven = equations(world, start.bodies, generalised(pose, push), command, dt)
-    jets, limit = jets_at(world, cut, end, pose), command.torque_limit
-    solved = solve_together(world, velocity, mass, driven, pose, cut, jets, limit)  # 6
-    store_state(world, half, advected, dyed, solved, cut, pose)  # 7
+    jets, limit = jets_at(world, end), command.torque_limit
+    volumes = advected.volumes
+    solved = solve_together(world, velocity, volumes, driven, pose, cut, jets, limit)  # 6
+    store_state(world, start, half, advected, dyed, solved, cut, pose)  # 7
     state.wake, state.sea = far.wake, far.velocity
     known |= {"dye_budget_error": dyed.error}
-    return report_coupled(world, dt, pose, mass, half, driven_sides, solved, known)
+    return report_coupled(world, dt, pose, half, driven_sides, solved, known)

@@ -17,7 +17,7 @@ from flowborne.coupling.solve import Solved, SolvedFlow
 from flowborne.coupling.stream import winds_on
 from flowborne.coupling.world import World
 from flowborne.fluid.control_volumes import momentum_changes
-from flowborne.kernels.arrays import Array, Faces
+from flowborne.kernels.arrays import Array
 from flowborne.solids.dynamics import Kinematics
 from flowborne.solids.flesh import Flesh
 from flowborne.solids.model import SolidModel
@@ -97,7 +97,6 @@ def report_coupled(
     world: World,
     dt: float,
     pose: Kinematics,
-    mass: Faces,
     half: HalfPressure,
     advected: AdvectionResult,
     solved: SolvedFlow,
@@ -105,7 +104,6 @@ def report_coupled(
 ) -> StepReport:
     """Of a step with a fluid: forces on the bodies, the budget of momentum, how well the solve did.
 
-    mass   Faces, of the fluid at the end of the step, kg
     known  what the report says of forces known before the solve, and of dyes
     """
     flesh, added = world.setup.solid.flesh, solved.added_mass
@@ -115,7 +113,7 @@ def report_coupled(
 
     world.splitting = (*world.splitting, added_mass)
     if world.setup.balances:
-        known |= momentum_budget(world, mass, half, advected, solved)
+        known |= momentum_budget(world, half, advected, solved)
     known |= {
         "centre": pose.mass_centre,
         "pressure_wrench": on_bodies(pose, flesh, (solved.impulse + half.impulse) / dt),
@@ -142,11 +140,10 @@ def on_bodies(pose: Kinematics, flesh: Flesh | None, push: Array) -> Array:
 
 
 def momentum_budget(
-    world: World, mass: Faces, half: HalfPressure, advected: AdvectionResult, solved: SolvedFlow
+    world: World, half: HalfPressure, advected: AdvectionResult, solved: SolvedFlow
 ) -> dict[str, Any]:
-    """What the report says of the fluid's momentum, with the masses `mass` of the faces at the end
-    of the step."""
-    fluid, _ = world.flow()
+    """What the report says of the fluid's momentum."""
+    (fluid, _), mass = world.flow(), solved.mass
     before, grid, boundaries = solved.before_pressure, fluid.grid, fluid.boundaries
     first = 6 * world.setup.solid.nbody
     fields = advected.velocity, before, solved.velocity

@@ -16,13 +16,16 @@ from flowborne.coupling.shapes import Shapes, shapes
 from flowborne.fluid.boundary import Boundaries, Source
 from flowborne.fluid.control_volumes import ControlVolumes
 from flowborne.fluid.grid import Grid
+from flowborne.fluid.projection import PressureGradient
 from flowborne.fluid.state import FluidState, under
 from flowborne.fluid.wake import wake_shape
 from flowborne.fluid.window import Window, crosses
 from flowborne.kernels.arrays import Array
+from flowborne.solids.dynamics import Kinematics
 from flowborne.solids.model import SolidModel, SolidState
 from flowborne.solids.trajectories import NOTHING_TOLD, Told, Trajectory
 from flowborne.solids.wind import Wind
+from flowborne.solvers.pressure import PressureSystem
 
 TRIAL_TOLERANCE = 1e-5
 """Relative residual of the pressure in a hypothetical step: gradients are right to 1e-3."""
@@ -140,11 +143,13 @@ class World:
     parts   most parts that a step of the world itself has been divided into, see `bodies_step`
     memory  the controller's own arrays, by name
     told    what joints are told from outside in this frame: not part of the state
-    cut     the positions (nq,) for which the grid was cut last, and that cut: made from the state,
-            and not part of it
+    cut     the positions (nq,) for which the grid was cut last, the bodies there, and that cut:
+            made from the state, and not part of it
     volumes the cut that the last step ended with, and its control volumes; likewise
     still   the cut that did not change in the last step, the band of its leak-proof projection, and
             that projection, which a copy makes anew; likewise
+    pressed the control volumes that the last step ended with, the gradient of the pressure on them,
+            and its matrix; likewise
     splitting
             make the added-mass part of forces, for each part of the last step; likewise
     """
@@ -158,15 +163,19 @@ class World:
     parts: int = 1
     memory: dict[str, Array] = field(default_factory=dict)
     told: Told = NOTHING_TOLD
-    cut: tuple[Array, Geometry] | None = field(default=None, repr=False, compare=False)
+    cut: tuple[Array, Kinematics, Geometry] | None = field(default=None, repr=False, compare=False)
     volumes: tuple[Geometry, ControlVolumes] | None = field(default=None, repr=False, compare=False)
     still: tuple[Geometry, Band | None, Projection] | None = field(
+        default=None, repr=False, compare=False
+    )
+    pressed: tuple[ControlVolumes, PressureGradient, PressureSystem] | None = field(
         default=None, repr=False, compare=False
     )
     splitting: tuple[Callable[[], Array], ...] = field(default=(), repr=False, compare=False)
 
     def __getstate__(self) -> dict[str, object]:
-        return vars(self) | {"cut": None, "volumes": None, "still": None, "splitting": ()}
+        kept = dict.fromkeys(("cut", "volumes", "still", "pressed"))
+        return vars(self) | kept | {"splitting": ()}
 
     @classmethod
     def at_rest(cls, setup: Setup) -> World:
@@ -192,7 +201,9 @@ class World:
     def copy(self) -> World:
         fluid = None if self.fluid is None else self.fluid.copy()
         memory = {name: values.copy() for name, values in self.memory.items()}
-        return replace(self, solid=self.solid.copy(), fluid=fluid, memory=memory, still=None)
+        copy = replace(self, solid=self.solid.copy(), fluid=fluid, memory=memory)
+        copy.still = copy.pressed = None
+        return copy
 
     def arrays(self) -> dict[str, Array]:
         """The whole state as named arrays; `from_arrays` is the way back, bit for bit."""

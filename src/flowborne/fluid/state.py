@@ -22,7 +22,8 @@ class FluidState:
     A step replaces the arrays of velocity and pressure: one kept over it has the old values.
 
     velocity           u^n on the faces, m/s; 0 where a face is wholly closed
-    velocity_change    u^n - u^{n-1} on the faces, m/s; 0 next to bodies, and before the first step
+    velocity_change    u^n - u^{n-1} on the faces, m/s; 0 before the first step, and next to bodies
+                       but those that stand in a trial
     acceleration       a^{n-1/2} on the faces, m/s^2: the part of that change that is not advection,
                        per time; 0 next to bodies
     pressure           p^{n-1/2}, (nx, ny, nz), Pa: dynamic, without the hydrostatic part

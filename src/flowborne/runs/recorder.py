@@ -80,19 +80,19 @@ class Recorder:
             axes = [f"velocity_{'xyz'[axis]}" for axis in world.setup.fluid.grid.axes]
             scalars = [name for name in named if name.startswith("scalar_")]
             kept |= {name: named[name] for name in ("pressure", *axes, *scalars)}
-            kept["open"] = open_cells(world, pose)
+            kept["open"] = open_cells(world)
         exact = {"time": np.array(world.time)}
         if world.setup.fluid is not None:
             exact["grid_origin"] = np.array(world.setup.fluid.grid.origin)
         return exact | {name: values.astype(np.float32) for name, values in kept.items()}
 
 
-def open_cells(world: World, pose: Kinematics) -> Array:
+def open_cells(world: World) -> Array:
     """(nx, ny, nz) open fraction of each cell, from the bodies' distance to its centre."""
     from flowborne.coupling.cut import cut_by_bodies
 
     assert world.setup.fluid is not None
-    distance = cut_by_bodies(world, pose).distance
+    distance = cut_by_bodies(world).distance
     for _ in range(3):
         # mean of neighbours along the first axis, which then becomes the last; once per axis
         distance = np.moveaxis(0.5 * (distance[1:] + distance[:-1]), 0, -1)

@@ -122,10 +122,10 @@ def check_mouth_cells(
     """Every mouth must cover cells of the grid at the start; for a scene with no other fault."""
     world = World.at_rest(setup)
     world.solid = start
-    cut = cut_by_bodies(world)
+    cut_by_bodies(world)
     for index, mouth in enumerate(mouths):
         world.setup = Setup(setup.solid, setup.fluid, mouths=(mouth,))
         try:
-            jets_at(world, cut, 0.0)
+            jets_at(world, 0.0)
         except ValueError as error:
             yield f"{places.at('mouths', index)}: {error}."
