@@ -10,7 +10,14 @@ from flowborne.kernels.aggregates import (
     mark_interpolated,
     mark_own,
 )
-from flowborne.kernels.levels import S0, along_axes, at_level, orphans_at, weights_at, wrap_ghosts
+from flowborne.kernels.levels import (
+    S0,
+    at_level,
+    interpolation_at,
+    orphans_at,
+    weights_at,
+    wrap_ghosts,
+)
 from flowborne.solvers.pressure import PressureSystem
 
 from .padded import cells_of
@@ -72,7 +79,7 @@ def test_marks_orphans_and_their_weights_are_what_numpy_says(shape, periodic, se
     mark_own(marks, w, inverse, factor)
     np.testing.assert_array_equal(marks[cells_of(marks)], mark_own_reference(w, inverse, factor))
     wrap_ghosts(marks, around)
-    interpolation = along_axes(b.interpolation, table, 0)
+    interpolation = interpolation_at(b.interpolation, table, 0)
     expected = mark_interpolated_reference(marks, w, inverse, interpolation)
     mark_interpolated(marks, w, inverse, interpolation)
     np.testing.assert_array_equal(marks, expected)

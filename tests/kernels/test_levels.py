@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -12,8 +14,10 @@ from flowborne.kernels.levels import (
     coarse_sums,
     coarse_weights,
     columns_to_diagonal,
+    distance_ratio,
     finest_weights,
     has_any,
+    interpolation_weights,
     inverse_diagonal,
     orphans_at,
     weights_at,
@@ -21,6 +25,7 @@ from flowborne.kernels.levels import (
 from flowborne.kernels.regions import label_regions, region_loads, region_sums, remove_null
 
 from .padded import cells_of
+from .references.centres import distance_ratio_reference, interpolation_weights_reference
 from .references.levels import (
     coarse_sums_reference,
     coarse_weights_reference,
@@ -34,6 +39,23 @@ from .references.regions import (
     remove_null_reference,
 )
 from .test_multigrid import SHAPES, system_of
+
+LENGTHS = list(itertools.product((5, 8, 13, 16), (1, 2, 4), (1, 2), (False, True)))
+"""Finest cells, how many of them in a fine cell, factor of coarsening, whether periodic."""
+
+
+@pytest.mark.parametrize(("cells", "size", "factor", "periodic"), LENGTHS)
+def test_distances_between_centres(cells: int, size: int, factor: int, periodic: bool) -> None:
+    coarse = -(-cells // (size * factor))
+    for face in range(coarse + 1):
+        given = face, factor, size, cells, periodic
+        assert distance_ratio(*given) == pytest.approx(distance_ratio_reference(*given)), face
+    n = -(-cells // size)
+    interpolation = np.empty(n + 2, np.float32)
+    interpolation_weights(interpolation, n, factor, size, cells, periodic)
+    np.testing.assert_allclose(
+        interpolation, interpolation_weights_reference(n, factor, size, cells, periodic), atol=1e-7
+    )
 
 
 @pytest.mark.parametrize("shape", [(6, 7, 10), (1, 12, 9)])

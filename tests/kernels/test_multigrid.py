@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from flowborne.kernels.conjugate_gradients import deflated
-from flowborne.kernels.levels import along_axes, at_level, orphans_at, weights_at, wrap_ghosts
+from flowborne.kernels.levels import at_level, interpolation_at, orphans_at, weights_at, wrap_ghosts
 from flowborne.kernels.smoothing import STEPS, apply_laplacian, defect, first_smooth, smooth
 from flowborne.kernels.v_cycle import interpolate, restrict, v_cycle
 from flowborne.solvers.pressure import PressureSystem
@@ -76,7 +76,7 @@ def transfer_of(system):
     b = system.buffers
     return (
         at_level(b.marks, b.table, 0),
-        along_axes(b.interpolation, b.table, 0),
+        interpolation_at(b.interpolation, b.table, 0),
         orphans_at(b.orphans, b.table, 0),
         at_level(b.aggregates, b.table, 0),
     )

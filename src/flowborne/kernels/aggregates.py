@@ -12,15 +12,12 @@ from __future__ import annotations
 import numpy as np
 from numba import prange
 
-from flowborne.kernels.arrays import Indices, Integers, Marks, Periodic, Real, Triple
-from flowborne.kernels.control_volumes import stride
+from flowborne.kernels.arrays import Array, Indices, Integers, Marks, Periodic, Real, Triple
 from flowborne.kernels.jit import kernel
 
 OWN = 8
 """Mark of a fine cell that belongs to the coarse cell over it; marks 1, 2 and 4 besides: it may
 also interpolate from the next coarse cell along that axis. Ghosts are marked as well."""
-
-Pair = tuple[int, int]
 
 CUT, ACTIVE = 1, 2
 """What there is among the fine cells under a coarse one: cells that do not touch, active cells."""
@@ -69,6 +66,7 @@ def mark_largest(
     marks: Marks, w: Triple, inverse: Real, first: tuple[int, int, int], end: tuple[int, int, int]
 ) -> None:
     """Mark the largest connected part of at most 2 x 2 x 2 cells as OWN, the others as 0."""
+    w0, w1, w2 = w
     part, size = np.full(8, -1), np.zeros(8, np.int64)
     for i in range(first[0], end[0]):
         for j in range(first[1], end[1]):
@@ -85,8 +83,13 @@ def mark_largest(
                 m = n ^ (4 >> axis)
                 if m > n or part[n] < 0 or part[m] < 0 or part[n] == part[m]:
                     continue
-                below = inverse[i - int(axis == 0), j - int(axis == 1), k - int(axis == 2)]
-                if w[axis][i, j, k] * max(inverse[i, j, k], below) > WEAK:
+                if axis == 0:
+                    share = w0[i, j, k] * max(inverse[i, j, k], inverse[i - 1, j, k])
+                elif axis == 1:
+                    share = w1[i, j, k] * max(inverse[i, j, k], inverse[i, j - 1, k])
+                else:
+                    share = w2[i, j, k] * max(inverse[i, j, k], inverse[i, j, k - 1])
+                if share > WEAK:
                     part[n] = part[m] = min(part[n], part[m])
                     changed = True
     for n in range(8):
@@ -143,13 +146,14 @@ def neighbour(at: int, axis: int, up: int, shape: Integers, periodic: Periodic) 
     up     0: lower face, 1: upper face
     shape  of the padded array
     """
-    step, inner = stride(shape, axis), shape[axis] - 2
-    place = (at // step) % shape[axis]
+    stride = shape[2] if axis == 1 else (1 if axis == 2 else shape[1] * shape[2])
+    place = (at // stride) % shape[axis]
+    inner = shape[axis] - 2
     if up and place == inner:
-        return at - (inner - 1) * step if periodic[axis] else -1
+        return at - (inner - 1) * stride if periodic[axis] else -1
     if not up and place == 1:
-        return at + (inner - 1) * step if periodic[axis] else -1
-    return at + (2 * up - 1) * step
+        return at + (inner - 1) * stride if periodic[axis] else -1
+    return at + (2 * up - 1) * stride
 
 
 @kernel
@@ -165,7 +169,11 @@ def cover(at: int, shape: Integers, factor: Integers, coarse_shape: Integers) ->
 @kernel
 def face_of(w: Triple, shape: Integers, axis: int, at: int, up: int) -> float:
     """Weight of the lower or upper face of a cell."""
-    return float(w[axis].reshape(-1)[at + up * stride(shape, axis)])
+    if axis == 0:
+        return float(w[0].reshape(-1)[at + up * shape[1] * shape[2]])
+    if axis == 1:
+        return float(w[1].reshape(-1)[at + up * shape[2]])
+    return float(w[2].reshape(-1)[at + up])
 
 
 @kernel
@@ -222,7 +230,7 @@ def add_orphan_weights(
     w: Triple,
     coarse: Triple,
     factor: Integers,
-    ratio: Triple,
+    ratio: Array,
     periodic: Periodic,
     orphans: Indices,
     aggregates: Indices,
@@ -230,7 +238,7 @@ def add_orphan_weights(
     """Add the faces of orphans to the faces between their aggregates and the coarse cells beyond.
 
     w, coarse  padded weights of the fine and the coarse level
-    ratio      of distances for the coarse faces across each axis, see `hierarchy.distance_ratio`
+    ratio      (3, most faces) of distances for each coarse face, see `levels.distance_ratio`
     """
     shape, wide = np.array(marks.shape), np.array(coarse[0].shape)
     aggregate, flat = aggregates.reshape(-1), marks.reshape(-1)
@@ -250,24 +258,24 @@ def add_orphan_weights(
                     there = cover(other, shape, factor, wide)
                 else:
                     continue
-                pair = int(aggregate[at]), int(there)
-                add_between(coarse, wide, pair, weight, ratio, periodic)
+                add_between(coarse, wide, aggregate[at], there, weight, ratio, periodic)
 
 
 @kernel
 def add_between(
-    coarse: Triple, shape: Integers, pair: Pair, weight: float, ratio: Triple, periodic: Periodic
+    coarse: Triple, shape: Integers, a: int, b: int, weight: float, ratio: Array, periodic: Periodic
 ) -> None:
-    """Add a fine weight to the coarse face between a pair of coarse cells, if they share one."""
-    low, high = min(pair), max(pair)
+    """Add a fine weight to the coarse face between two coarse cells, if they share one."""
+    low, high = min(a, b), max(a, b)
     for axis in range(3):
-        step, inner = stride(shape, axis), shape[axis] - 2
-        place = (high // step) % shape[axis]
+        stride = shape[2] if axis == 1 else (1 if axis == 2 else shape[1] * shape[2])
+        inner = shape[axis] - 2
+        place = (high // stride) % shape[axis]
         w = coarse[axis].reshape(-1)
-        if high - low == step and place > 1:
-            w[high] += weight * ratio[axis][place - 1]
+        if high - low == stride and place > 1:
+            w[high] += weight * ratio[axis, place - 1]
             return
-        if periodic[axis] and high - low == (inner - 1) * step and place == inner:
-            w[low] += weight * ratio[axis][0]
-            w[high + step] += weight * ratio[axis][inner]
+        if periodic[axis] and high - low == (inner - 1) * stride and place == inner:
+            w[low] += weight * ratio[axis, 0]
+            w[high + stride] += weight * ratio[axis, inner]
             return

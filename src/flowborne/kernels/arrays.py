@@ -41,13 +41,11 @@ Marks = NDArray[np.uint8]
 Indices = NDArray[np.int32]
 Labels = NDArray[np.int32]
 
-Hierarchy = tuple[
-    Integers, Periodic, Triple, Real, Real, Marks, Real, Array, Marks, Indices, Indices
-]
+Hierarchy = tuple[Integers, Periodic, Triple, Real, Real, Marks, Real, Marks, Indices, Indices]
 """Table of levels; which axes are periodic; packed over the levels: weights across each axis, what
 is added to the diagonal, the inverse of that, which rows are even (see `even`), interpolation
-weights and ratios of distances along each axis (see `solvers.hierarchy`), marks, orphans and their
-aggregates (see `aggregates`)."""
+coefficients (see `levels.interpolation_weights`), marks, orphans and their aggregates (see
+`aggregates`)."""
 
 Finest = tuple[Array, Array, Array, Array]
 """Padded weights across each axis and diagonal of the finest level."""

@@ -43,9 +43,65 @@ from flowborne.kernels.even import ROUNDING, SINGLE, find_even
 from flowborne.kernels.jit import kernel
 from flowborne.kernels.vectors import largest, scaled
 
-OFFSET, N0, N1, N2, AXES, S0, S1, S2, ORPHANS, ROW, COMMON = range(11)
+
+@kernel
+def distance_ratio(face: int, factor: int, fine: int, cells: int, periodic: bool) -> float:
+    """Distance between the centres beside fine face `factor * face` over that of the coarse face.
+
+    face    of the coarse level, 0 to its last
+    factor  1 or 2, the coarsening of this axis
+    fine    finest cells in a fine cell of this axis; `cells` finest cells in all
+    """
+    ratio = np.zeros(2)
+    for n in range(2):
+        size = fine if n == 0 else fine * factor
+        count = (cells + size - 1) // size
+        at = min(factor * face, count) if n == 0 else face
+        below, above = at - 1, at
+        if periodic:
+            below, above = below % count, above % count
+        for c in (below, above):
+            if 0 <= c < count:
+                ratio[n] += min(size, cells - c * size)
+    return float(ratio[0] / ratio[1])
+
+
+@kernel
+def interpolation_weights(
+    interpolation: Real, n: int, factor: int, size: int, cells: int, periodic: bool
+) -> None:
+    """How far each fine cell's centre lies from its coarse cell's towards the next coarse cell.
+
+    interpolation  (n + 2,) with ghosts: fraction of the distance between the coarse centres (at
+                   an open side: of that to the side), negative towards the lower neighbour
+    size      finest cells in a fine cell of this axis, `cells` finest cells in all
+    """
+    interpolation[:] = 0.0
+    if factor == 1:
+        return
+    count = (n + 1) // 2
+    for i in range(n):
+        c = i // 2
+        first, second = 2 * c, 2 * c + 1
+        if second >= n:
+            continue
+        a = float(min(size, cells - first * size))
+        b = float(min(size, cells - second * size))
+        other = c - 1 if i == first else c + 1
+        if periodic:
+            other = other % count
+        width = 0.0
+        if 0 <= other < count:
+            width = float(min(2 * size, cells - other * 2 * size))
+        reach = a + b + width
+        interpolation[i + 1] = -b / reach if i == first else a / reach
+    if periodic:
+        interpolation[0], interpolation[n + 1] = interpolation[n], interpolation[1]
+
+
+OFFSET, N0, N1, N2, INTERPOLATION, S0, S1, S2, ORPHANS, ROW, COMMON = range(11)
 """Columns of the table of levels: where it begins in the packed arrays, cells along each axis,
-where what it has along its axes begins, the finest cells in one of its cells, how many of its
+where its interpolation coefficients begin, the finest cells in one of its cells, how many of its
 cells are orphans, where its rows begin, its common cell (see `even`)."""
 
 
@@ -81,12 +137,12 @@ def even_at(even: Marks, table: Integers, level: int) -> Marks:
 
 
 @kernel
-def along_axes(packed: Real, table: Integers, level: int) -> Triple:
-    """What one level has along each axis, with ghosts: interpolation weights, ratios."""
-    a = table[level, AXES]
+def interpolation_at(interpolation: Real, table: Integers, level: int) -> Triple:
+    """The interpolation coefficients of one level along each axis, with ghosts."""
+    a = table[level, INTERPOLATION]
     b = a + table[level, N0] + 2
     c = b + table[level, N1] + 2
-    return packed[a:b], packed[b:c], packed[c : c + table[level, N2] + 2]
+    return interpolation[a:b], interpolation[b:c], interpolation[c : c + table[level, N2] + 2]
 
 
 @kernel
@@ -99,12 +155,22 @@ def orphans_at(orphans: Indices, table: Integers, level: int) -> Indices:
 @kernel
 def wrap_ghosts(x: NDArray[Any], periodic: Periodic) -> None:
     """Copy the values at each end of a periodic axis to the ghosts at the other end."""
-    for axis in range(3):
-        along, last = np.swapaxes(x, 0, axis), x.shape[axis] - 1
-        if periodic[axis] and last > 0:
-            for a in range(along.shape[1]):
-                for b in range(along.shape[2]):
-                    along[0, a, b], along[last, a, b] = along[last - 1, a, b], along[1, a, b]
+    p0, p1, p2 = x.shape
+    if periodic[0] and p0 > 1:
+        for j in range(p1):
+            for k in range(p2):
+                x[0, j, k] = x[p0 - 2, j, k]
+                x[p0 - 1, j, k] = x[1, j, k]
+    if periodic[1]:
+        for i in range(p0):
+            for k in range(p2):
+                x[i, 0, k] = x[i, p1 - 2, k]
+                x[i, p1 - 1, k] = x[i, 1, k]
+    if periodic[2]:
+        for i in range(p0):
+            for j in range(p1):
+                x[i, j, 0] = x[i, j, p2 - 2]
+                x[i, j, p2 - 1] = x[i, j, 1]
 
 
 @kernel
@@ -141,12 +207,12 @@ def finest_weights(
 
 @kernel
 def coarse_weights(
-    fine: Real, coarse: Real, marks: Marks, axis: int, factor: Integers, ratio: Real
+    fine: Real, coarse: Real, marks: Marks, axis: int, factor: Integers, ratio: Array
 ) -> None:
     """Coarse lower-face weights across `axis` from faces between fine cells marked as OWN.
 
     factor  fine cells in a coarse one along each axis
-    ratio   of distances, per coarse face across `axis`; see `hierarchy.distance_ratio`
+    ratio   of distances, per coarse face across `axis`; see `distance_ratio`
     """
     f0, f1, f2 = factor
     d = 1 if fine.shape[0] > 1 else 0
@@ -235,25 +301,30 @@ def columns_to_diagonal(weights: Triple, added: Real, periodic: Periodic) -> Non
 
     weights, added  padded
     """
+    shape = added.shape
+    stride = shape[1] * shape[2], shape[2], 1
+    more = added.reshape(-1)
     for axis in range(3):
-        n, w = added.shape[axis] - 2, np.swapaxes(weights[axis], 0, axis)
+        n, step, w = shape[axis] - 2, stride[axis], weights[axis].reshape(-1)
         if periodic[axis] or n < 1:
             continue
-        more = np.swapaxes(added, 0, axis)
+        one, other = int(axis == 0), 2 - int(axis == 2)
         for cell, outer, inner in ((1, 1, 2), (n, n + 1, n)):
-            for a in range(w.shape[1]):
-                for b in range(w.shape[2]):
-                    if w[outer, a, b] < w[inner, a, b]:
-                        more[cell, a, b] += w[outer, a, b]
-                        w[outer, a, b] = 0.0
+            for a in range(shape[one]):
+                for b in range(shape[other]):
+                    at = a * stride[one] + b * stride[other]
+                    moved = w[at + outer * step]
+                    if moved < w[at + inner * step]:
+                        more[at + cell * step] += moved
+                        w[at + outer * step] = 0.0
 
 
 @kernel
 def coarsen(hierarchy: Hierarchy) -> None:
     """Fill all levels from the weights of the finest, from what is added to its diagonal, and from
     which of its rows are even."""
-    table, periodic, weights, reaction, inverse, even = hierarchy[:6]
-    interpolation, ratios, marks, orphans, aggregates = hierarchy[6:]
+    table, periodic, weights, reaction, inverse, even, interpolation = hierarchy[:7]
+    marks, orphans, aggregates = hierarchy[7:]
     reacts = has_any(at_level(reaction, table, 0))
     for level in range(table.shape[0] - 1):
         w, share = weights_at(weights, table, level), at_level(inverse, table, level)
@@ -264,9 +335,17 @@ def coarsen(hierarchy: Hierarchy) -> None:
         inverse_diagonal(w, added, share)
         if level == table.shape[0] - 2:
             break
-        factor = table[level + 1, S0 : S2 + 1] // table[level, S0 : S2 + 1]
-        towards = along_axes(interpolation, table, level)
-        ratio = along_axes(ratios, table, level + 1)
+        factor = np.empty(3, np.int64)
+        most = max(table[level + 1, N0], table[level + 1, N1], table[level + 1, N2])
+        ratio = np.empty((3, most + 1))
+        towards = interpolation_at(interpolation, table, level)
+        for axis in range(3):
+            n, size, cells = table[level, N0 + axis], table[level, S0 + axis], table[0, N0 + axis]
+            wraps = periodic[axis] != 0
+            factor[axis] = table[level + 1, S0 + axis] // size
+            interpolation_weights(towards[axis], n, factor[axis], size, cells, wraps)
+            for face in range(table[level + 1, N0 + axis] + 1):
+                ratio[axis, face] = distance_ratio(face, factor[axis], size, cells, wraps)
         mark, aggregate = at_level(marks, table, level), at_level(aggregates, table, level)
         wide = weights_at(weights, table, level + 1)
         coarse_shape = np.array(wide[0].shape)

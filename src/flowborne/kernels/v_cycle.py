@@ -23,9 +23,9 @@ from flowborne.kernels.jit import inlined, kernel
 from flowborne.kernels.levels import (
     COMMON,
     OFFSET,
-    along_axes,
     at_level,
     even_at,
+    interpolation_at,
     orphans_at,
     weights_at,
     wrap_ghosts,
@@ -175,8 +175,9 @@ SERIAL = 40_000
 def leg(hierarchy: Hierarchy, x: Real, b: Real, r: Real, level: int, down: bool) -> None:
     """The cycle's work on one level, on its way down (from x = 0, then b of the next level) or up
     (from x of the next level)."""
-    table, periodic, weights, _, inverse, even = hierarchy[:6]
-    interpolation, _, marks, orphans, aggregates = hierarchy[6:]
+    table, periodic, weights, _, inverse, even, interpolation, marks, orphans, aggregates = (
+        hierarchy
+    )
     coarsest = table.shape[0] - 2
     (w0, w1, w2), a = weights_at(weights, table, level), at_level(inverse, table, level)
     operator = (w0, w1, w2, a, even_at(even, table, level), table[level, COMMON])
@@ -185,7 +186,7 @@ def leg(hierarchy: Hierarchy, x: Real, b: Real, r: Real, level: int, down: bool)
     fine = not periodic.any() and level < coarsest
     between = (
         at_level(marks, table, level),
-        along_axes(interpolation, table, level),
+        interpolation_at(interpolation, table, level),
         orphans_at(orphans, table, level),
         at_level(aggregates, table, level),
     )

@@ -24,16 +24,7 @@ from flowborne.kernels.arrays import (
     Real,
     Vectors,
 )
-from flowborne.kernels.levels import (
-    AXES,
-    N0,
-    ROW,
-    S0,
-    along_axes,
-    even_at,
-    fill_levels,
-    padded_size,
-)
+from flowborne.kernels.levels import INTERPOLATION, ROW, even_at, fill_levels, padded_size
 from flowborne.kernels.regions import label_regions
 
 COARSEST = 4
@@ -44,65 +35,21 @@ def level_table(shape: tuple[int, int, int]) -> Integers:
     """(levels + 1, 11) hierarchy over a grid of `shape` cells; see `levels.OFFSET` to `COMMON`."""
     levels = []
     counts, size = list(shape), [1, 1, 1]
-    offset = along = rows = 0
+    offset = interpolation = rows = 0
     while True:
         cells = padded_size(counts[0], counts[1], counts[2])
-        levels.append([offset, *counts, along, *size, 0, rows, 0])
+        levels.append([offset, *counts, interpolation, *size, 0, rows, 0])
         offset += cells
         rows += cells // (counts[2] + 2)
-        along += sum(counts) + 6
+        interpolation += sum(counts) + 6
         if max(counts) <= COARSEST:
             break
         for axis in range(3):
             if counts[axis] > 2:
                 counts[axis] = (counts[axis] + 1) // 2
                 size[axis] *= 2
-    levels.append([offset, 0, 0, 0, along, 0, 0, 0, 0, rows, 0])
+    levels.append([offset, 0, 0, 0, interpolation, 0, 0, 0, 0, rows, 0])
     return np.array(levels, np.int64)
-
-
-def widths(cells: int, size: int, periodic: bool) -> Array:
-    """(n + 2,) finest cells, of all `cells` along an axis, in each cell of a level, which has
-    `size` but for the last; at the ends in those beyond, none at a side."""
-    found = np.minimum(size, cells - np.arange(0.0, cells, size))
-    return np.pad(found, 1, mode="wrap" if periodic else "constant")
-
-
-def distance_ratio(fine: Array, coarse: Array) -> Array:
-    """(n + 1,) distance between the centres beside the fine face at each coarse face along an axis
-    over that of the coarse face, from the widths of the cells of both levels."""
-    factor = 1 if fine.size == coarse.size else 2
-    at = np.minimum(factor * np.arange(coarse.size - 1), fine.size - 2)
-    return np.asarray((fine[at] + fine[at + 1]) / (coarse[:-1] + coarse[1:]))
-
-
-def interpolation_weights(fine: Array, coarse: Array, periodic: bool) -> Array:
-    """(n + 2,) how far each fine cell's centre lies from its coarse cell's towards the next coarse
-    cell along an axis, with ghosts: fraction of the distance between the coarse centres (at an open
-    side: of that to the side), negative towards the lower neighbour."""
-    found, pairs = np.zeros(fine.size), fine.size // 2 - 1
-    if coarse.size < fine.size:
-        first, second = fine[1 : 2 * pairs : 2], fine[2 : 2 * pairs + 1 : 2]
-        found[1 : 2 * pairs : 2] = -second / (first + second + coarse[:pairs])
-        found[2 : 2 * pairs + 1 : 2] = first / (first + second + coarse[2 : pairs + 2])
-    if periodic:
-        found[0], found[-1] = found[-2], found[1]
-    return found
-
-
-def transfer(table: Integers, periodic: tuple[bool, bool, bool]) -> tuple[Real, Array]:
-    """Interpolation weights of all levels, packed, and the ratios of distances from the next finer
-    one to each."""
-    interpolation, ratio = packed(int(table[-1, AXES])), np.zeros(table[-1, AXES])
-    for level in range(len(table) - 2):
-        towards = along_axes(interpolation, table, level)
-        shrinks = along_axes(ratio, table, level + 1)
-        for axis, ring in enumerate(periodic):
-            sizes = table[level : level + 2, S0 + axis]
-            fine, coarse = (widths(table[0, N0 + axis], size, ring) for size in sizes)
-            towards[axis][:] = interpolation_weights(fine, coarse, ring)
-            shrinks[axis][:-1] = distance_ratio(fine, coarse)
-    return interpolation, ratio
 
 
 def packed(size: int) -> Real:
@@ -129,13 +76,13 @@ class Buffers:
         self.reaction = packed(total)
         self.inverse = packed(total)
         self.even: Marks = np.zeros(int(self.table[-1, ROW]), np.uint8)
-        self.interpolation, self.ratio = transfer(self.table, periodic)
+        self.interpolation = packed(int(self.table[-1, INTERPOLATION]))
         self.marks: Marks = np.full(total, OWN, np.uint8)
         self.orphans: Indices = np.zeros(total, np.int32)
         self.aggregates: Indices = np.zeros(total, np.int32)
-        of_faces = self.weights, self.reaction, self.inverse, self.even
-        between = self.interpolation, self.ratio, self.marks, self.orphans, self.aggregates
-        self.hierarchy: Hierarchy = (self.table, self.periodic, *of_faces, *between)
+        of_faces = self.weights, self.reaction, self.inverse, self.even, self.interpolation
+        of_cells = self.marks, self.orphans, self.aggregates
+        self.hierarchy: Hierarchy = (self.table, self.periodic, *of_faces, *of_cells)
         self.cycle = packed(total), packed(total), packed(total)
         self.label: Labels = np.zeros(padded, np.int32)
         self.parent: Labels = np.zeros(self.label.size + 1, np.int32)

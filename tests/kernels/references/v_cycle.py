@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from flowborne.kernels.arrays import Array, Hierarchy, Real
-from flowborne.kernels.levels import along_axes, at_level, orphans_at, weights_at, wrap_ghosts
+from flowborne.kernels.levels import at_level, interpolation_at, orphans_at, weights_at, wrap_ghosts
 from flowborne.kernels.smoothing import STEPS
 from flowborne.kernels.v_cycle import COARSEST
 
@@ -15,8 +15,7 @@ from .transfer import interpolate_reference, restrict_reference
 
 def v_cycle_reference(hierarchy: Hierarchy, b: Real, level: int = 0) -> Array:
     """`v_cycle` in NumPy: x of a level for its b, both padded, ghosts of x as the sides have it."""
-    table, periodic, weights, _, inverse = hierarchy[:5]
-    interpolation, _, marks, orphans, aggregates = hierarchy[6:]
+    table, periodic, weights, _, inverse, _, interpolation, marks, orphans, aggregates = hierarchy
     w, a = weights_at(weights, table, level), at_level(inverse, table, level)
     coarsest = level == table.shape[0] - 2
     x = np.zeros(b.shape)
@@ -27,7 +26,7 @@ def v_cycle_reference(hierarchy: Hierarchy, b: Real, level: int = 0) -> Array:
         return x
     parts = (
         at_level(marks, table, level),
-        along_axes(interpolation, table, level),
+        interpolation_at(interpolation, table, level),
         orphans_at(orphans, table, level),
         at_level(aggregates, table, level),
     )
