@@ -12,7 +12,7 @@ import numpy as np
 
 from flowborne.coupling.cut import pose_and_cut
 from flowborne.coupling.drives import joint_command
-from flowborne.coupling.operators import cross, generalised, twists
+from flowborne.coupling.operators import generalised, twists
 from flowborne.coupling.report import StepReport, timed
 from flowborne.coupling.solve import solve_bodies
 from flowborne.coupling.step_report import report_bodies
@@ -24,6 +24,7 @@ from flowborne.solids.driven import Driven, drive
 from flowborne.solids.dynamics import kinematics
 from flowborne.solids.following import follow
 from flowborne.solids.model import SolidState
+from flowborne.solids.scratch import cross
 from flowborne.solids.trajectories import JointCommand
 
 

@@ -19,10 +19,8 @@ from flowborne.kernels.arrays import FREE, Array, DenseTerm, Faces, Integers
 from flowborne.kernels.coupling_rows import add_body_velocity
 from flowborne.kernels.sparse_rows import add_rows, sum_rows
 from flowborne.solids.dynamics import Kinematics
+from flowborne.solids.scratch import cross
 from flowborne.solvers.pressure import NO_DENSE_TERM
-
-TURNED, AGAIN = np.array([1, 2, 0]), np.array([2, 0, 1])
-"""The axes, each of them a place and two places on."""
 
 
 def twists(kinematics: Kinematics, v: Array) -> Array:
@@ -93,11 +91,6 @@ def pressure_push(geometry: Geometry, pressure: Array, size: int) -> Array:
     """(size,) J^T p of a pressure field (nx, ny, nz): wrenches about the world origin on bodies and
     forces on vertices of flesh, N and N m (impulses for p^ = p dt)."""
     return sum_rows(np.ascontiguousarray(pressure), geometry.rows, size)
-
-
-def cross(a: Array, b: Array) -> Array:
-    """a x b over the last axis: what `np.cross` gives, without its search for axes."""
-    return a[..., TURNED] * b[..., AGAIN] - a[..., AGAIN] * b[..., TURNED]
 
 
 def buoyancy_wrench(centroid: Array, volume: Array, gravity: Array, density: float) -> Array:

@@ -221,14 +221,13 @@ def solve_together(
         outcome = Outcome.PRESSURE_NOT_CONVERGED
     change = boundary_velocity(pose, v - driven.system.v)
     plain = partial(pressure_system, gradient, cut.open)
-    added_mass: Array | Callable[[], Array] = partial(added_mass_impulse, plain, cut, change)
+    added_mass: Array | Callable[[], Array] = np.full(change.size, np.nan)
     divergence = fastest = np.nan
     if world.setup.balances:
         moved = start + term.mobility.times(on_solids)
         divergence = largest_divergence(after, cut, moved, rate, fluid)
         fastest = max(largest_open(after[axis], cut.open[axis], 0.0) for axis in fluid.grid.axes)
-    else:
-        added_mass = np.full(change.size, np.nan)
+        added_mass = partial(added_mass_impulse, plain, cut, change)
     if world.setup.splits:
         own = (lambda: matrix) if mobility.is_dense else plain
         added_mass = added_mass_impulse(own, cut, change)

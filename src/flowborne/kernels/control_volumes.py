@@ -115,6 +115,24 @@ def all_beside(shape: Three, wraps: Three, f: int) -> tuple[int, int, int, int, 
     return (a, b, c, d, *both_beside(f, k, 1, shape[2], wraps[2]))
 
 
+@inlined
+def cell_beside(at: tuple[int, int, int], upper: int, faces: FaceGrid) -> int:
+    """Flat index of the cell below or above the face at (i, j, k) of a component; -1 beyond the
+    domain."""
+    component, shape, wraps = faces
+    (i, j, k), n1, n2, count = at, shape[1], shape[2], shape[component] - 1
+    place = at[component] - 1 + upper
+    if wraps[component] > 0:
+        place += count * (int(place < 0) - int(place >= count))
+    elif place < 0 or place >= count:
+        return -1
+    if component == 0:
+        return int((place * n1 + j) * n2 + k)
+    if component == 1:
+        return int((i * (n1 - 1) + place) * n2 + k)
+    return int((i * n1 + j) * (n2 - 1) + place)
+
+
 @njit(nogil=True, cache=True)
 def neighbour(shape: Three | Integers, wraps: Three | Integers, f: int, way: int) -> int:
     """Flat index of one control volume beside f; `way` as in `all_beside`."""
@@ -188,14 +206,13 @@ def find_targets(
     """
     targets, parts = np.empty((small.size, 6), np.int64), np.zeros((small.size, 6))
     turn, last = np.full(small.size, -1), 0
-    (component, shape, wraps), cell_shape = faces, np.array(cells.shape)
+    component, shape, wraps = faces
     volume_flat, open_flat = volumes.reshape(-1), opened.reshape(-1)
     cell_flat, pushed = cells.reshape(-1), kinds.reshape(-1)
     for n in range(small.size):
         f = small[n]
         targets[n, :] = f
-        i, j, k = indices(shape, f)
-        beside = all_beside(shape, wraps, f)
+        at, beside = indices(shape, f), all_beside(shape, wraps, f)
         around, ahead, shut = 0.0, 0.0, 0.0
         for way in range(6):
             to = beside[way]
@@ -203,21 +220,8 @@ def find_targets(
                 targets[n, way], parts[n, way] = to, volume_flat[to]
                 around += volume_flat[to]
         for side in range(2):
-            a = i - int(component == 0 and side == 0)
-            b = j - int(component == 1 and side == 0)
-            c = k - int(component == 2 and side == 0)
-            if wraps[component] > 0:
-                if component == 0:
-                    a = (a + wraps[0]) % wraps[0]
-                elif component == 1:
-                    b = (b + wraps[1]) % wraps[1]
-                else:
-                    c = (c + wraps[2]) % wraps[2]
-            outside = a < 0 or b < 0 or c < 0
-            if outside or a >= cell_shape[0] or b >= cell_shape[1] or c >= cell_shape[2]:
-                continue
-            way = 2 * component + side
-            to, volume = beside[way], cell_flat[(a * cell_shape[1] + b) * cell_shape[2] + c]
+            way, cell = 2 * component + side, cell_beside(at, side, faces)
+            to, volume = beside[way], cell_flat[cell] if cell >= 0 else 0.0
             if volume <= nothing:
                 continue
             if to >= 0 and pushed[to] & DRIVEN:
@@ -241,20 +245,20 @@ def find_targets(
             beside = all_beside(shape, wraps, small[n])
             for way in range(6):
                 to = beside[way]
-                at = place_of(small, to, 0) if to >= 0 else small.size
-                if at < small.size and small[at] == to and 0 <= turn[at] <= last:
+                m = place_of(small, to, 0) if to >= 0 else small.size
+                if m < small.size and small[m] == to and 0 <= turn[m] <= last:
                     targets[n, way], parts[n, way] = to, max(volume_flat[to], nothing)
             total = parts[n].sum()
             if total > 0.0:
                 parts[n] /= total
                 turn[n], led = last + 1, True
         last += int(led)
-    order, at = np.empty(small.size, np.int64), 0
+    order, count = np.empty(small.size, np.int64), 0
     for own in range(last, -2, -1):
         for n in range(small.size):
             if turn[n] == own:
-                order[at] = n
-                at += 1
+                order[count] = n
+                count += 1
     return Closed(small[order], targets[order], parts[order])
 
 

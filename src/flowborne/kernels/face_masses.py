@@ -20,6 +20,7 @@ from flowborne.kernels.control_volumes import (
     across_axis,
     all_beside,
     both_beside,
+    cell_beside,
     find_targets,
     indices,
     listed_kinds,
@@ -53,24 +54,6 @@ class Openings(NamedTuple):
     above: Integers
     way: Array
     rest: Array
-
-
-@inlined
-def cell_beside(at: tuple[int, int, int], upper: int, faces: FaceGrid) -> int:
-    """Flat index of the cell below or above the face at (i, j, k) of a component; -1 beyond the
-    domain."""
-    component, shape, wraps = faces
-    (i, j, k), n1, n2, count = at, shape[1], shape[2], shape[component] - 1
-    place = at[component] - 1 + upper
-    if wraps[component] > 0:
-        place += count * (int(place < 0) - int(place >= count))
-    elif place < 0 or place >= count:
-        return -1
-    if component == 0:
-        return int((place * n1 + j) * n2 + k)
-    if component == 1:
-        return int((i * (n1 - 1) + place) * n2 + k)
-    return int((i * n1 + j) * (n2 - 1) + place)
 
 
 @inlined

@@ -45,7 +45,7 @@ def of_room(scene: Scene, most: float, frames: int = 4) -> Result:
     with Simulation(scene, 1, "serial") as simulation, kernel_threads(1):
         simulation.advance_frame()
         reports = [simulation.advance_frame() for _ in range(frames)]
-        shape, lines = simulation.world.flow()[0].grid.shape, of_one_frame(simulation)
+        shape, (_, lines) = simulation.world.flow()[0].grid.shape, of_two_frames(simulation)
     spent = float(np.median([report.seconds["total"] / len(report.steps) for report in reports]))
     lines.append("WaterLily: 123 to 137 ns without a body, 1205 of a pulsing jelly")
     cells = " x ".join(map(str, shape))
@@ -59,16 +59,17 @@ def of_trials(scene: Scene, most: float, frames: int = 4) -> Result:
         simulation.advance_frame()
         spent = [simulation.advance_frame().seconds["control"] for _ in range(frames)]
         shape = simulation.world.flow()[0].grid.shape
-        calls, lines = calls_of(simulation.advance_frame), of_one_frame(simulation)
-    taken = sum(n for code, n in calls.items() if code.co_name == STEP) - 1
+        both, lines = of_two_frames(simulation)
+    taken = both - 1  # the last is the world's own
     cells = " x ".join(map(str, shape[:2]))
     title = f"{scene.name}, {cells} cells: microseconds a step of a trial, one thread"
     lines.insert(0, f"{1e3 * np.median(spent):.1f} ms a decision of {taken} steps")
     return at_most("steps", title, 1e6 * float(np.median(spent)) / taken, most, lines)
 
 
-def of_one_frame(simulation: Simulation) -> list[str]:
-    """Python's calls and new memory of the next two frames, in words."""
+def of_two_frames(simulation: Simulation) -> tuple[int, list[str]]:
+    """Steps of the next frame, those of trials too; its Python's calls and the new memory of the
+    one after it, in words."""
     calls = calls_of(simulation.advance_frame)
     taken = sum(n for code, n in calls.items() if code.co_name == STEP)
     tracemalloc.start()
@@ -79,7 +80,7 @@ def of_one_frame(simulation: Simulation) -> list[str]:
     finally:
         tracemalloc.stop()
     each = calls.total() / taken
-    return [
+    return taken, [
         f"{each:.0f} calls of Python functions a step",
         f"{1e-6 * (most - before):.2f} MB more than between two frames, at most",
     ]
