@@ -14,6 +14,7 @@ from flowborne.kernels.dye import face_of
 from flowborne.kernels.jit import inlined, kernel
 
 Volumes = tuple[Array, Array, Array, Array]
+Box = tuple[tuple[int, int], tuple[int, int], tuple[int, int]]
 
 
 @kernel
@@ -49,6 +50,48 @@ def mark_unsettled(
                 left = start[i, j, k] + dt * (rate[i, j, k] - net) - end[i, j, k]
                 cut = min(before[i, j, k], end[i, j, k]) < cell
                 marks[i, j, k] = cut or not abs(left) <= slack
+
+
+@inlined
+def surplus(flux: Faces, volumes: Volumes, i: int, j: int, k: int, dt: float) -> float:
+    """Volume per time by which fluxes fill a cell too much; see `mark_unsettled`."""
+    (start, rate, _, end), (qx, qy, qz) = volumes, flux
+    deep = qx.shape[0] - start.shape[0]
+    net = qx[i + deep, j, k] - qx[i, j, k] + qy[i, j + 1, k] - qy[i, j, k]
+    net += qz[i, j, k + 1] - qz[i, j, k]
+    return (start[i, j, k] - end[i, j, k]) / dt + rate[i, j, k] - net
+
+
+@kernel
+def fill_around(flux: Faces, volumes: Volumes, box: Box, dt: float) -> None:
+    """Let fluxes fill the cells outside a box in dt, in place: each passes its surplus on towards
+    the box, along one axis after the other.
+
+    volumes  as in `mark_unsettled`
+    box      first cell along each axis, and the one after the last
+    """
+    (n0, n1, n2), ((a0, b0), (a1, b1), (a2, b2)) = volumes[0].shape, box
+    for line in prange(n1 if n0 > b0 - a0 else 0):
+        row, qx = np.int64(line), flux[0]  # from within: a loop's arrays count as different ones
+        for i in range(a0):
+            for k in range(n2):
+                qx[i + 1, row, k] += surplus(flux, volumes, i, row, k, dt)
+        for i in range(n0 - 1, b0 - 1, -1):
+            for k in range(n2):
+                qx[i, row, k] -= surplus(flux, volumes, i, row, k, dt)
+    for line in prange(b0 - a0):
+        row, qy, qz = a0 + np.int64(line), flux[1], flux[2]
+        for j in range(a1):
+            for k in range(n2):
+                qy[row, j + 1, k] += surplus(flux, volumes, row, j, k, dt)
+        for j in range(n1 - 1, b1 - 1, -1):
+            for k in range(n2):
+                qy[row, j, k] -= surplus(flux, volumes, row, j, k, dt)
+        for j in range(a1, b1):
+            for k in range(a2):
+                qz[row, j, k + 1] += surplus(flux, volumes, row, j, k, dt)
+            for k in range(n2 - 1, b2 - 1, -1):
+                qz[row, j, k] -= surplus(flux, volumes, row, j, k, dt)
 
 
 @inlined
