@@ -51,10 +51,11 @@ def test_threads_change_no_bit() -> None:
 
 @SHAPES
 def test_rates(shape: Shape) -> None:
-    opened, mass = np.abs(fields(shape, 2))
+    opened, volume = np.abs(fields(shape, 2))
     rate = np.empty(shape)
-    accelerate(rate, opened, mass, 0.3)
-    np.testing.assert_allclose(rate, accelerate_reference(opened, mass, 0.3), rtol=1e-14)
+    accelerate(rate, opened, volume, 1.7, 0.3)
+    expected = accelerate_reference(opened, 1.7 * volume, 0.3)
+    np.testing.assert_allclose(rate, expected, rtol=1e-14)
 
 
 @SHAPES

@@ -116,12 +116,13 @@ def test_push_faces(shape: tuple[int, int, int], axis: int, sides: tuple[int, in
         np.moveaxis(rate, axis, 0)[-end] = 0.0
     expected = subtract_gradient_reference(velocity, rate, pressure, axis, 0.7, sides)
     thin, threaded, periodic = velocity.copy(), velocity.copy(), sides[0] == PERIODIC
-    subtract_gradient(velocity, rate, pressure, axis, 0.7, periodic)
-    subtract_gradient.parallel(threaded, rate, pressure, axis, 0.7, periodic)
+    out = np.empty(velocity.shape)
+    subtract_gradient((velocity, velocity, rate), pressure, axis, 0.7, periodic)
+    subtract_gradient.parallel((out, threaded, rate), pressure, axis, 0.7, periodic)
     np.testing.assert_allclose(velocity, expected, atol=1e-14)
-    np.testing.assert_array_equal(velocity, threaded)
+    np.testing.assert_array_equal(velocity, out)
     if shape[2] == 1 and axis < 2:
         grid = Grid(shape, 0.1)
-        fields = (plane(values, grid) for values in (thin, rate, pressure))
-        subtract_gradient(*fields, axis + 1, 0.7, periodic)
+        flat, rates, cells = (plane(values, grid) for values in (thin, rate, pressure))
+        subtract_gradient((flat, flat, rates), cells, axis + 1, 0.7, periodic)
         np.testing.assert_array_equal(thin, velocity)

@@ -147,8 +147,8 @@ def gradient_on(world: World, cut: Geometry, volumes: ControlVolumes) -> Pressur
     if world.pressed is not None and world.pressed[0] is volumes:
         return world.pressed[1]
     fluid, _ = world.flow()
-    mass = face_masses(volumes, fluid.density)
-    return pressure_gradient(cut.open, mass, fluid.density, fluid.grid, fluid.boundaries)
+    given = volumes.moving, fluid.density, fluid.grid, fluid.boundaries
+    return pressure_gradient(cut.open, *given)
 
 
 def moved_since(world: World) -> bool:

@@ -46,12 +46,12 @@ def flat(values: Array) -> Array:
 
 
 @kernel
-def accelerate(out: Array, opened: Array, mass: Array, area: float) -> None:
+def accelerate(out: Array, opened: Array, volume: Array, density: float, area: float) -> None:
     """a A / m: what a difference of pressures accelerates a face by; 0 where there is no mass."""
-    rate, part, masses = flat(out), flat(opened), flat(mass)
+    rate, part, volumes = flat(out), flat(opened), flat(volume)
     for i in prange(rate.shape[0]):
         for k in range(rate.shape[1]):
-            m = masses[i, k]
+            m = density * volumes[i, k]
             rate[i, k] = area * part[i, k] / m if m > 0.0 else 0.0
 
 
