@@ -8,7 +8,7 @@ import numpy as np
 
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.ghosts import edge, plane, planes
-from flowborne.fluid.grid import Grid, faces_of
+from flowborne.fluid.grid import Grid, extent, faces_of
 from flowborne.fluid.projection import PressureGradient
 from flowborne.kernels.arrays import Faces, Marks
 from flowborne.kernels.projection import Volumes, fill_around
@@ -77,9 +77,8 @@ def band_around(cells: Marks, grid: Grid, sides: Boundaries) -> Band | None:
     if any(sides.periodic()) or not cells.any():
         return None
     for axis in grid.axes:
-        n, others = grid.shape[axis], tuple(a for a in range(3) if a != axis)
-        found = np.flatnonzero(cells.any(axis=others))
-        first, stop = int(found[0]) - LAYERS, int(found[-1]) + 1 + LAYERS
+        n, (first, stop) = grid.shape[axis], extent(cells, axis)
+        first, stop = first - LAYERS, stop + LAYERS
         more = (first - stop) % EVEN
         size = stop - first + more
         if first < 0 or stop > n or size > n:
