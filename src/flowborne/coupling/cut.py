@@ -122,7 +122,7 @@ def departure(world: World) -> Departure:
     fluid, state = world.flow()
     cut = cut_by_bodies(world)
     jets, sources = jets_at(world, world.time), source_rate(fluid, world.time, cut.open)
-    rate = sources.copy()
+    rate = sources.copy() if jets else sources
     add_rates(rate, jets)
     volumes, bodies = volumes_of(world, cut), world.solid.copy()
     return Departure(fluid, state, cut, volumes, jets, sources, rate, bodies)

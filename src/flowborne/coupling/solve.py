@@ -39,7 +39,7 @@ from flowborne.coupling.operators import (
 from flowborne.coupling.report import Outcome, timed
 from flowborne.coupling.viscous_solve import diffuse
 from flowborne.coupling.world import World
-from flowborne.fluid.control_volumes import ControlVolumes, face_masses
+from flowborne.fluid.control_volumes import ControlVolumes
 from flowborne.fluid.grid import Grid
 from flowborne.fluid.projection import PressureGradient, face_weights
 from flowborne.kernels.arrays import ROUNDING, Array, Faces, Integers
@@ -88,7 +88,6 @@ class SolvedFlow(Solved):
     """The same with the fluid's. Impulses (k,) on bodies are wrenches about the world origin, then
     forces on vertices of flesh, N s and N m s.
 
-    mass             Faces, of the fluid that pressure on each face accelerates, kg
     viscous_impulse  (k,)
     added_mass       (k,) the part of `impulse` of `added_mass_impulse`, or what gives it; nan in
                      trials
@@ -103,7 +102,6 @@ class SolvedFlow(Solved):
     fastest          largest |u+| on an open face, m/s; likewise
     """
 
-    mass: Faces
     viscous_impulse: Array
     added_mass: Array | Callable[[], Array]
     before_pressure: Faces
@@ -175,7 +173,7 @@ def solve_together(
     """
     dt = driven.system.dt
     fluid, state = world.flow()
-    mass, mobility = face_masses(volumes, fluid.density), driven.mobility(pose)
+    mobility = driven.mobility(pose)
     gradient, matrix = pressure_on(world, volumes, cut, mobility)
     pressure = dt * state.pressure
     tolerance = fluid.tolerance
@@ -183,7 +181,7 @@ def solve_together(
         tolerance = max(tolerance, TIGHTENING)
     rate = source_rate(fluid, world.time + dt, cut.open)
     add_rates(rate, jets)
-    smooth, viscous, smoothed = diffuse(world, velocity, mass, gradient, cut, jets, pose, driven)
+    smooth, viscous, smoothed = diffuse(world, velocity, volumes, gradient, cut, jets, pose, driven)
     term = LowRankTerm(cut.rows, mobility)
     net, area = np.empty(fluid.grid.shape), fluid.grid.face_area
     open_outflow(net, cut.open, smooth, rate, area)
@@ -206,7 +204,7 @@ def solve_together(
             if not changed.same_mobility(driven):
                 term = replace(term, mobility=changed.mobility(pose))
                 smooth, viscous, smoothed = diffuse(
-                    world, velocity, mass, gradient, cut, jets, pose, changed
+                    world, velocity, volumes, gradient, cut, jets, pose, changed
                 )
                 open_outflow(net, cut.open, smooth, rate, area)
             tried, driven = driven, changed
@@ -240,7 +238,6 @@ def solve_together(
         actuator,
         outcome,
         left,
-        mass=mass,
         viscous_impulse=viscous,
         added_mass=added_mass,
         before_pressure=smooth,
