@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -96,6 +98,23 @@ def test_whole_cells_stay_whole_and_cut_ones_as_they_are_cut(
         holds = ~plain & (cut.volume > 0.01 * whole)
         assert np.abs(cells[holds] / cut.volume[holds] - 1.0).max() < 0.02
     assert is_band(solves, grid)
+
+
+@GRIDS
+def test_dye_keeps_its_amount_and_bounds_whatever_pressures_leave(
+    grid: Grid, solves: list[tuple[int, ...]]
+) -> None:
+    rough = block(grid)
+    fluid = replace(rough.flow()[0], tolerance=1e-5, scalars=("dye",))
+    world = World.at_rest(rough.setup.but(fluid=fluid))
+    world.solid.v[:] = rough.solid.v
+    dye = np.random.default_rng(0).integers(0, 2, grid.shape).astype(float)
+    world.flow()[1].scalars["dye"][:] = dye
+    for _ in range(30):
+        assert advance(world, DT).dye_budget_error < 1e-14
+        dye = world.flow()[1].scalars["dye"]
+        assert 0.0 <= dye.min() < dye.max() <= 1.0
+    assert is_band(solves[1:], grid)
 
 
 def test_a_flow_that_was_put_in_is_corrected_everywhere(solves: list[tuple[int, ...]]) -> None:

@@ -9,7 +9,6 @@ from flowborne import Grid, World
 from flowborne.bodies import TrajectorySinusoid, kinematics
 from flowborne.coupling.cut import volumes_of
 from flowborne.coupling.operators import twists
-from flowborne.fluid.control_volumes import face_masses
 from flowborne.fluid.projection import accelerated, face_weights
 from flowborne.kernels.closed_fractions import CREASE
 from flowborne.worlds import advance, cut_by_bodies, make_world
@@ -99,8 +98,8 @@ def test_cells_that_a_body_and_a_side_seal_have_no_row() -> None:
         disc = f'<body pos="8.3 {3.0 + depth} 0"><freejoint/><geom type="sphere" size="3"/></body>'
         world = make_world(mjcf(disc), grid)
         cut, sides = cut_by_bodies(world), world.flow()[0].boundaries
-        mass = face_masses(volumes_of(world, cut), 1.0)
-        x, y, _ = face_weights(cut.open, accelerated(cut.open, mass, grid, sides), grid)
+        moving = volumes_of(world, cut).moving
+        x, y, _ = face_weights(cut.open, accelerated(cut.open, moving, 1.0, grid, sides), grid)
         total = x[1:] + x[:-1] + y[:, 1:] + y[:, :-1]
         assert total.ravel()[cut.rows[0]].min() > 0.0, f"depth {depth}"
         sealed += int(((total[:, 0] == 0.0) & (cut.open[1][:, 0] > 0.0)).sum())

@@ -13,7 +13,11 @@ from flowborne.fluid.sides.kinds import BoundaryInflow, BoundaryOpen, BoundaryPe
 from flowborne.fluid.transport import Transport
 from flowborne.kernels.arrays import Array, Faces
 
-RING = BoundaryPeriodic()
+RING, OPEN = BoundaryPeriodic(), BoundaryOpen()
+INFLOW = BoundaryInflow(
+    lambda x, y, z, time: (-0.9 + 0.0 * x, 0.4 + 0.0 * x, 0.0 * x),
+    {"dye": lambda x, y, z, time: 1.0 * (y > 0.5) + 0.0 * x},
+)
 
 
 def whole(grid: Grid, sides: Boundaries) -> ControlVolumes:
@@ -86,6 +90,32 @@ def test_dye_keeps_its_amount_and_its_bounds_in_whatever_flow(shape: tuple[int, 
         assert later.sum() == pytest.approx(dye.sum(), rel=1e-14)
         assert dye.min() <= later.min() < later.max() <= dye.max()
         dye = later
+
+
+@pytest.mark.parametrize("shape", [(20, 17, 1), (16, 14, 12)])
+@pytest.mark.parametrize("sides", [Boundaries(), Boundaries(RING, RING), Boundaries(OPEN, INFLOW)])
+def test_cells_that_dye_does_not_reach_need_no_look(
+    shape: tuple[int, int, int], sides: Boundaries, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    grid, patch, counts = Grid(shape, 0.1), np.zeros(shape), []
+    patch[3:5, 6:9, :5] = np.random.default_rng(7).random((2, 3, min(shape[2], 5)))
+    reached = Passage.reached
+
+    def counted(*given):  # type: ignore[no-untyped-def]
+        counts.append(np.zeros(shape)[reached(*given)].size)
+        return reached(*given)
+
+    def everywhere(*given):  # type: ignore[no-untyped-def]
+        return tuple(slice(0, n) for n in shape)
+
+    flow = swirls(grid)
+    for u, speed in zip(flow, (-0.9, 0.4, 0.0), strict=True):
+        u += speed * (sides != Boundaries())
+    monkeypatch.setattr(Passage, "reached", counted)
+    found = carried(patch, flow, 0.05, grid, sides, 4)
+    monkeypatch.setattr(Passage, "reached", everywhere)
+    np.testing.assert_allclose(found, carried(patch, flow, 0.05, grid, sides, 4), atol=1e-15)
+    assert min(counts) < 0.8 * patch.size
 
 
 def test_dye_goes_around_a_ring_and_comes_back() -> None:

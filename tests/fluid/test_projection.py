@@ -67,19 +67,18 @@ def net_outflow(velocity: Faces, opened: Faces, grid: Grid) -> Array:
     return net * grid.face_area
 
 
-def masses_of(opened: Faces, grid: Grid, sides: Boundaries) -> Faces:
-    """Density a V of every face, half of it on the sides of the domain."""
-    masses = faces_of([DENSITY * grid.cell_volume * o for o in opened])
-    for axis, mass in enumerate(masses):
+def volumes_of(opened: Faces, grid: Grid, sides: Boundaries) -> Faces:
+    """a V of every face, half of it on the sides of the domain."""
+    volumes = faces_of([grid.cell_volume * o for o in opened])
+    for axis, volume in enumerate(volumes):
         for end in () if sides.periodic()[axis] else (0, -1):
-            mass[edge(axis, end)] *= 0.5
-    return masses
+            volume[edge(axis, end)] *= 0.5
+    return volumes
 
 
 def project(velocity: Faces, opened: Faces, grid: Grid, sides: Boundaries, rate: Array) -> Array:
     """Make `velocity` free of divergence but for the sources, in place; gives p^."""
-    mass = masses_of(opened, grid, sides)
-    gradient = pressure_gradient(opened, mass, DENSITY, grid, sides)
+    gradient = pressure_gradient(opened, volumes_of(opened, grid, sides), DENSITY, grid, sides)
     system = PressureSystem(face_weights(opened, gradient.rate, grid), sides.periodic())
     need = rate - net_outflow(velocity, opened, grid)
     solution = system.solve(need, tolerance=TOLERANCE)

@@ -8,6 +8,7 @@ import pytest
 from flowborne.kernels.faces import (
     accelerate,
     changes_of_step,
+    is_finite,
     largest_open,
     largest_size,
     mean_flux,
@@ -44,17 +45,18 @@ def test_mean_row(shape: Shape, axis: int, periodic: bool) -> None:
 def test_threads_change_no_bit() -> None:
     """Of what is not one operation for each face."""
     first, before, after, weight = fields((40, 33, 37), 4)
-    sums = weighted_sums(weight, first, before, after)
-    assert (weighted_sums.parallel(weight, first, before, after) == sums).all()
+    sums = weighted_sums(weight, 1.7, first, before, after)
+    assert (weighted_sums.parallel(weight, 1.7, first, before, after) == sums).all()
     assert largest_open.parallel(before, after, 0.0) == largest_open(before, after, 0.0)
 
 
 @SHAPES
 def test_rates(shape: Shape) -> None:
-    opened, mass = np.abs(fields(shape, 2))
+    opened, volume = np.abs(fields(shape, 2))
     rate = np.empty(shape)
-    accelerate(rate, opened, mass, 0.3)
-    np.testing.assert_allclose(rate, accelerate_reference(opened, mass, 0.3), rtol=1e-14)
+    accelerate(rate, opened, volume, 1.7, 0.3)
+    expected = accelerate_reference(opened, 1.7 * volume, 0.3)
+    np.testing.assert_allclose(rate, expected, rtol=1e-14)
 
 
 @SHAPES
@@ -89,11 +91,22 @@ def test_a_velocity_goes_on(shape: Shape) -> None:
 
 @SHAPES
 def test_weighted_sums(shape: Shape) -> None:
-    mass, first, before, after = fields(shape, 4)
+    volume, first, before, after = fields(shape, 4)
+    mass = 1.7 * volume
     change = mass * (after - before)
     parts = mass * first, mass * before, mass * after, change, np.abs(change)
     sums = [part.sum() for part in parts]
-    np.testing.assert_allclose(weighted_sums(mass, first, before, after), sums, rtol=1e-12)
+    found = weighted_sums(volume, 1.7, first, before, after)
+    np.testing.assert_allclose(found, sums, rtol=1e-12)
+
+
+@SHAPES
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_one_value_that_is_no_number_is_found(shape: Shape, value: float) -> None:
+    (field,) = fields(shape, 1)
+    assert is_finite(field)
+    field[tuple(n // 2 for n in shape)] = value
+    assert not is_finite(field)
 
 
 @SHAPES

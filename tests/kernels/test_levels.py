@@ -117,7 +117,9 @@ def test_regions(shape: tuple, periodic: tuple, seed: int) -> None:
                 ends[-1] = ends[1]
     label, parent = np.empty_like(b.label), np.empty_like(b.parent)
     count = np.zeros_like(b.count)
-    regions = label_regions(b.finest, system.buffers.periodic, label, parent, count)
+    regions = label_regions(
+        b.finest, system.finest[4], system.buffers.periodic, label, parent, count
+    )
     expected = label_regions_reference(b.finest, system.buffers.periodic)
     assert regions == expected.max() + 1 > 1
     np.testing.assert_array_equal(label, expected)

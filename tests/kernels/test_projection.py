@@ -10,9 +10,15 @@ import pytest
 from flowborne.fluid.ghosts import plane, planes
 from flowborne.fluid.grid import Grid
 from flowborne.kernels.arrays import FREE, PERIODIC, PRESCRIBED
-from flowborne.kernels.projection import mark_unsettled, net_out, open_outflow, subtract_gradient
+from flowborne.kernels.projection import (
+    fill_around,
+    mark_unsettled,
+    net_out,
+    open_outflow,
+    subtract_gradient,
+)
 
-from .references.outflow import outflow_reference
+from .references.outflow import fill_around_reference, outflow_reference
 from .references.pressure_gradient import subtract_gradient_reference
 
 SHAPES = [(5, 7, 6), (9, 8, 1), (1, 4, 3)]
@@ -70,6 +76,36 @@ def test_cells_that_are_cut_or_that_fluxes_do_not_fill_are_marked(
     np.testing.assert_array_equal(marks.astype(bool), expected)
 
 
+@pytest.mark.parametrize(
+    ("shape", "box"),
+    [
+        ((9, 7, 6), (slice(3, 5), slice(2, 6), slice(1, 3))),
+        ((5, 8, 7), (slice(0, 5), slice(1, 3), slice(4, 7))),
+        ((9, 8, 1), (slice(2, 5), slice(3, 4), slice(0, 1))),
+    ],
+)
+def test_fluxes_fill_the_cells_around_a_box(
+    shape: tuple[int, int, int], box: tuple[slice, slice, slice]
+) -> None:
+    random, grid, dt = np.random.default_rng(6), Grid(shape, 1.0), 0.3
+    x, y, z = faces(shape, 0)
+    start, rate, end = (random.random(shape) for _ in range(3))
+    if grid.is_slab:
+        z[:] = 0.0
+    expected = fill_around_reference((x, y, z), (start - end) / dt + rate, box)
+    volumes = tuple(plane(v, grid) for v in (start, rate, end, end))
+    ends = tuple((c.start, c.stop) for c in box)
+    ends = ((0, 1), *ends[:2]) if grid.is_slab else ends
+    for version in (fill_around, fill_around.parallel):
+        flux = x.copy(), y.copy(), z.copy()
+        version(planes(flux, grid), volumes, ends, dt)
+        for found, known in zip(flux, expected, strict=True):
+            np.testing.assert_allclose(found, known, atol=1e-13)
+        left = start + dt * (rate - outflow_reference(flux, (np.ones(1),) * 3)) - end
+        left[box] = 0.0
+        assert np.abs(left).max() < 1e-14
+
+
 @pytest.mark.parametrize("shape", SHAPES)
 @pytest.mark.parametrize("axis", [0, 1, 2])
 @pytest.mark.parametrize("sides", SIDES)
@@ -80,12 +116,13 @@ def test_push_faces(shape: tuple[int, int, int], axis: int, sides: tuple[int, in
         np.moveaxis(rate, axis, 0)[-end] = 0.0
     expected = subtract_gradient_reference(velocity, rate, pressure, axis, 0.7, sides)
     thin, threaded, periodic = velocity.copy(), velocity.copy(), sides[0] == PERIODIC
-    subtract_gradient(velocity, rate, pressure, axis, 0.7, periodic)
-    subtract_gradient.parallel(threaded, rate, pressure, axis, 0.7, periodic)
+    out = np.empty(velocity.shape)
+    subtract_gradient((velocity, velocity, rate), pressure, axis, 0.7, periodic)
+    subtract_gradient.parallel((out, threaded, rate), pressure, axis, 0.7, periodic)
     np.testing.assert_allclose(velocity, expected, atol=1e-14)
-    np.testing.assert_array_equal(velocity, threaded)
+    np.testing.assert_array_equal(velocity, out)
     if shape[2] == 1 and axis < 2:
         grid = Grid(shape, 0.1)
-        fields = (plane(values, grid) for values in (thin, rate, pressure))
-        subtract_gradient(*fields, axis + 1, 0.7, periodic)
+        flat, rates, cells = (plane(values, grid) for values in (thin, rate, pressure))
+        subtract_gradient((flat, flat, rates), cells, axis + 1, 0.7, periodic)
         np.testing.assert_array_equal(thin, velocity)

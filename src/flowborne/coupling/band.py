@@ -7,10 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from flowborne.fluid.boundary import Boundaries
-from flowborne.fluid.ghosts import edge
-from flowborne.fluid.grid import Grid, faces_of
+from flowborne.fluid.ghosts import edge, plane, planes
+from flowborne.fluid.grid import Grid, extent, faces_of
 from flowborne.fluid.projection import PressureGradient
 from flowborne.kernels.arrays import Faces, Marks
+from flowborne.kernels.projection import Volumes, fill_around
 from flowborne.solvers.pressure import PressureSystem
 
 Projection = tuple[PressureGradient, PressureSystem]
@@ -54,6 +55,16 @@ class Band:
             own[axis][edge(axis, 0)] = own[axis][edge(axis, -1)] = 0.0
         return own
 
+    def fill_around(self, flux: Faces, volumes: Volumes, dt: float, whole: Grid) -> None:
+        """Let fluxes fill the cells outside, in place, by what they pass on towards the band.
+
+        volumes  see `kernels.projection.mark_unsettled`
+        """
+        start, rate, before, end = (plane(v, whole) for v in volumes)
+        x, y, z = ((c.start, c.stop) for c in self.cells)
+        box = ((0, 1), x, y) if whole.is_slab else (x, y, z)
+        fill_around(planes(flux, whole), (start, rate, before, end), box, dt)
+
 
 def band_around(cells: Marks, grid: Grid, sides: Boundaries) -> Band | None:
     """The band around cells that have to be corrected; None where it should be all of the grid.
@@ -66,9 +77,8 @@ def band_around(cells: Marks, grid: Grid, sides: Boundaries) -> Band | None:
     if any(sides.periodic()) or not cells.any():
         return None
     for axis in grid.axes:
-        n, others = grid.shape[axis], tuple(a for a in range(3) if a != axis)
-        found = np.flatnonzero(cells.any(axis=others))
-        first, stop = int(found[0]) - LAYERS, int(found[-1]) + 1 + LAYERS
+        n, (first, stop) = grid.shape[axis], extent(cells, axis)
+        first, stop = first - LAYERS, stop + LAYERS
         more = (first - stop) % EVEN
         size = stop - first + more
         if first < 0 or stop > n or size > n:

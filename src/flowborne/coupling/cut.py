@@ -122,7 +122,7 @@ def departure(world: World) -> Departure:
     fluid, state = world.flow()
     cut = cut_by_bodies(world)
     jets, sources = jets_at(world, world.time), source_rate(fluid, world.time, cut.open)
-    rate = sources.copy()
+    rate = sources.copy() if jets else sources
     add_rates(rate, jets)
     volumes, bodies = volumes_of(world, cut), world.solid.copy()
     return Departure(fluid, state, cut, volumes, jets, sources, rate, bodies)
@@ -147,8 +147,8 @@ def gradient_on(world: World, cut: Geometry, volumes: ControlVolumes) -> Pressur
     if world.pressed is not None and world.pressed[0] is volumes:
         return world.pressed[1]
     fluid, _ = world.flow()
-    mass = face_masses(volumes, fluid.density)
-    return pressure_gradient(cut.open, mass, fluid.density, fluid.grid, fluid.boundaries)
+    given = volumes.moving, fluid.density, fluid.grid, fluid.boundaries
+    return pressure_gradient(cut.open, *given)
 
 
 def moved_since(world: World) -> bool:

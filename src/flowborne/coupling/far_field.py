@@ -20,7 +20,6 @@ from flowborne.coupling.cut import Departure, moved_since, pose_and_cut
 from flowborne.coupling.flow import AdvectionResult
 from flowborne.coupling.operators import boundary_velocity, leak_proof
 from flowborne.coupling.world import Fluid, World
-from flowborne.fluid.control_volumes import face_masses
 from flowborne.fluid.grid import faces_of
 from flowborne.fluid.potential import Normal, brought
 from flowborne.fluid.projection import accelerated
@@ -58,8 +57,8 @@ class FarField:
         for place, across in self.normal.items():
             velocity[place.axis][place.layer] = across
         if self.gained.any():
-            mass = face_masses(advected.volumes, fluid.density)
-            rate = accelerated(opened, mass, grid, fluid.boundaries)
+            moving = advected.volumes.moving
+            rate = accelerated(opened, moving, fluid.density, grid, fluid.boundaries)
             for place in sea.far:
                 outward, at = 1.0 if place.upper else -1.0, list(place.cell_coordinates())
                 if place in self.normal:

@@ -22,7 +22,7 @@ from flowborne.coupling.operators import boundary_velocity, carried_at
 from flowborne.coupling.solve import SolvedFlow
 from flowborne.coupling.world import Fluid, World
 from flowborne.fluid.boundary import cells_in
-from flowborne.fluid.control_volumes import ControlVolumes, control_volumes, face_masses
+from flowborne.fluid.control_volumes import ControlVolumes, control_volumes
 from flowborne.fluid.dye import Dyed, Passage, carry_dye
 from flowborne.fluid.ghosts import edge, impose_sides
 from flowborne.fluid.grid import copied, faces_of
@@ -133,20 +133,21 @@ def apply_body_force_and_sides(
 
     time  s at the end of the step
     """
-    grid = fluid.grid
+    grid, density = fluid.grid, fluid.density
+    drives = [s for s in fluid.sources if s.velocity is not None and s.active(time)]
+    if not drives and not any(fluid.body_force):
+        return advected.velocity
     velocity = copied(advected.velocity, grid)
     if any(fluid.body_force):
-        mass = face_masses(advected.volumes, fluid.density)
-        rates = accelerated(opened, mass, grid, fluid.boundaries)
+        rates = accelerated(opened, advected.volumes.moving, density, grid, fluid.boundaries)
         for axis in grid.axes:
-            given = dt * fluid.density * fluid.body_force[axis] * grid.spacing
-            velocity[axis][:] += given * rates[axis]
+            velocity[axis][:] += dt * density * fluid.body_force[axis] * grid.spacing * rates[axis]
     for axis in grid.axes:
-        for source in fluid.sources:
-            if source.velocity is not None and source.active(time):
-                box = list(cells_in(source, grid))
-                box[axis] = slice(box[axis].start, box[axis].stop + 1)
-                velocity[axis][tuple(box)] = source.velocity[axis]
+        for source in drives:
+            assert source.velocity is not None
+            box = list(cells_in(source, grid))
+            box[axis] = slice(box[axis].start, box[axis].stop + 1)
+            velocity[axis][tuple(box)] = source.velocity[axis]
     impose_sides(velocity, grid, fluid.boundaries, time)
     return velocity
 
@@ -184,10 +185,12 @@ def store_state(
                 values.reshape(-1)[volumes.cut[axis]] = 0.0
             if sides.periodic()[axis]:
                 values[edge(axis, -1)] = values[edge(axis, 0)]
+    state.previous_pressure, state.pressure = state.pressure, solved.pressure
+    if half.velocity is not state.velocity:  # else none acted
+        left_out = solved.pressure == 0.0
+        state.previous_pressure = state.previous_pressure + half.pressure
+        state.pressure = np.where(left_out, 0.0, half.pressure + solved.pressure)
     state.velocity, state.velocity_change = velocity, state.velocity
-    state.previous_pressure = state.pressure + half.pressure
-    left_out = solved.pressure == 0.0
-    state.pressure = np.where(left_out, 0.0, half.pressure + solved.pressure)
     state.cell_volume, state.pose = volumes.cells, world.solid.q.copy()
     state.scalars = dyed.scalars
     world.advance_clock(dt)

@@ -16,10 +16,11 @@ holds at last comes from that behind.
 
 Away from what moves the velocity fills whole cells already, so the solve takes place in a band
 (`band`): what flows through its rim is kept. Outside cells are whole again, whatever pressures left
-of them. That would be missing from the amount of dyes, and with the tolerance of trials it shifts
-what they compare: there the band is the whole grid. A closed region of fluid, such as the band,
-keeps its volume, but that of the cells around a moving body varies a little on any grid: there the
-volumes of cut cells at the end are scaled, the more the more they are closed, by 1e-5 to 1e-2.
+of them. That would be missing from the amount of dyes: with dye each of these cells passes it on to
+the next one, towards the band. In trials pressures leave more, which shifts what they compare:
+there the band is the whole grid. A closed region of fluid, such as the band, keeps its volume, but
+that of the cells around a moving body varies a little on any grid: there the volumes of cut cells
+at the end are scaled, the more the more they are closed, by 1e-5 to 1e-2.
 
 In trials bodies stand for most steps. Then volumes stay, and so does the field of two such steps,
 which their pressures have solved for. In runs what pressures left would be missing from the amounts
@@ -112,11 +113,12 @@ def leak_proof_flux(
         return flux, cells
     swept = swept_cells(before, after, cells, grid, sides)
     start, end = swept.set_aside(flux, weights, cells, after.volume)
-    band, later = None, None
-    if not state.scalars and not world.setup.trial:
-        volumes = start, departure.rate, before.volume, end
+    volumes, band, later = (start, departure.rate, before.volume, end), None, None
+    if not world.setup.trial:
         band = band_around(unsettled(volumes, flux, grid, dt, slack, grid.cell_volume), grid, sides)
     if band is not None:
+        if state.scalars:
+            band.fill_around(flux, volumes, dt, grid)
         own, box = band.own(flux), band.cells
         inside = partial(PressureGradient, band.inner(weights), 0.0, None, band.grid, Boundaries())
         held = start[box] + dt * departure.rate[box]

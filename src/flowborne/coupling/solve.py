@@ -38,9 +38,9 @@ from flowborne.coupling.operators import (
 )
 from flowborne.coupling.report import Outcome, timed
 from flowborne.coupling.viscous_solve import diffuse
-from flowborne.coupling.world import Fluid, World
-from flowborne.fluid.control_volumes import ControlVolumes, face_masses
-from flowborne.fluid.grid import Grid, copied
+from flowborne.coupling.world import World
+from flowborne.fluid.control_volumes import ControlVolumes
+from flowborne.fluid.grid import Grid
 from flowborne.fluid.projection import PressureGradient, face_weights
 from flowborne.kernels.arrays import ROUNDING, Array, Faces, Integers
 from flowborne.kernels.faces import largest_open, largest_size
@@ -88,7 +88,6 @@ class SolvedFlow(Solved):
     """The same with the fluid's. Impulses (k,) on bodies are wrenches about the world origin, then
     forces on vertices of flesh, N s and N m s.
 
-    mass             Faces, of the fluid that pressure on each face accelerates, kg
     viscous_impulse  (k,)
     added_mass       (k,) the part of `impulse` of `added_mass_impulse`, or what gives it; nan in
                      trials
@@ -103,7 +102,6 @@ class SolvedFlow(Solved):
     fastest          largest |u+| on an open face, m/s; likewise
     """
 
-    mass: Faces
     viscous_impulse: Array
     added_mass: Array | Callable[[], Array]
     before_pressure: Faces
@@ -175,7 +173,7 @@ def solve_together(
     """
     dt = driven.system.dt
     fluid, state = world.flow()
-    mass, mobility = face_masses(volumes, fluid.density), driven.mobility(pose)
+    mobility = driven.mobility(pose)
     gradient, matrix = pressure_on(world, volumes, cut, mobility)
     pressure = dt * state.pressure
     tolerance = fluid.tolerance
@@ -183,9 +181,10 @@ def solve_together(
         tolerance = max(tolerance, TIGHTENING)
     rate = source_rate(fluid, world.time + dt, cut.open)
     add_rates(rate, jets)
-    smooth, viscous, smoothed = diffuse(world, velocity, mass, gradient, cut, jets, pose, driven)
+    smooth, viscous, smoothed = diffuse(world, velocity, volumes, gradient, cut, jets, pose, driven)
     term = LowRankTerm(cut.rows, mobility)
-    net = net_outflow(smooth, cut, rate, fluid)
+    net, area = np.empty(fluid.grid.shape), fluid.grid.face_area
+    open_outflow(net, cut.open, smooth, rate, area)
     floor = rounding_floor(smooth, cut, boundary_velocity(pose, driven.velocity), fluid.grid)
     iterations, tried = 0, driven
     for _ in range(PASSES):
@@ -205,14 +204,14 @@ def solve_together(
             if not changed.same_mobility(driven):
                 term = replace(term, mobility=changed.mobility(pose))
                 smooth, viscous, smoothed = diffuse(
-                    world, velocity, mass, gradient, cut, jets, pose, changed
+                    world, velocity, volumes, gradient, cut, jets, pose, changed
                 )
-                net = net_outflow(smooth, cut, rate, fluid)
+                open_outflow(net, cut.open, smooth, rate, area)
             tried, driven = driven, changed
         tolerance = max(fluid.tolerance, TIGHTENING * tolerance)
         pressure = solution.pressure
-    after = copied(smooth, fluid.grid)
-    gradient.subtract(after, solution.pressure, 1.0)
+    after = fluid.grid.empty_faces()
+    gradient.subtract(smooth, solution.pressure, 1.0, after)
     left = unsettled(tried, changed, v)
     outcome = Outcome.DONE if changed is None else Outcome.NOT_SETTLED
     if not smoothed:
@@ -225,7 +224,9 @@ def solve_together(
     divergence = fastest = np.nan
     if world.setup.balances:
         moved = start + term.mobility.times(on_solids)
-        divergence = largest_divergence(after, cut, moved, rate, fluid)
+        open_outflow(net, cut.open, after, rate, area)
+        add_flux(net, cut, moved)
+        divergence = largest_size(net) / fluid.grid.cell_volume
         fastest = max(largest_open(after[axis], cut.open[axis], 0.0) for axis in fluid.grid.axes)
         added_mass = partial(added_mass_impulse, plain, cut, change)
     if world.setup.splits:
@@ -237,7 +238,6 @@ def solve_together(
         actuator,
         outcome,
         left,
-        mass=mass,
         viscous_impulse=viscous,
         added_mass=added_mass,
         before_pressure=smooth,
@@ -323,25 +323,6 @@ def give_way(cut: Geometry, mobility: Mobility, grid: Grid) -> Array:
         room.flat[cells] += field.flat[cells] * moved.flat[cells] / PROBES
     room.flat[cells] = np.maximum(room.flat[cells], 0.0)
     return room
-
-
-def net_outflow(velocity: Faces, cut: Geometry, rate: Array, fluid: Fluid) -> Array:
-    """(nx, ny, nz) net outflow of each cell through the open faces, D u - sources, m^3/s.
-
-    rate  (nx, ny, nz) volume that sources and mouths bring into each cell, m^3/s
-    """
-    net = np.empty(fluid.grid.shape)
-    open_outflow(net, cut.open, velocity, rate, fluid.grid.face_area)
-    return net
-
-
-def largest_divergence(
-    velocity: Faces, cut: Geometry, moving: Array, rate: Array, fluid: Fluid
-) -> float:
-    """Largest |D u + J v - sources| / volume of a cell, 1/s, for the motion (k,) of the bodies."""
-    net = net_outflow(velocity, cut, rate, fluid)
-    add_flux(net, cut, moving)
-    return largest_size(net) / fluid.grid.cell_volume
 
 
 def rounding_floor(velocity: Faces, cut: Geometry, moving: Array, grid: Grid) -> float:

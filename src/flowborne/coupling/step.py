@@ -55,6 +55,7 @@ from flowborne.coupling.report import Outcome, StepReport, joined, timed
 from flowborne.coupling.solve import solve_together
 from flowborne.coupling.step_report import known_forces, report_coupled, report_failed
 from flowborne.coupling.world import World
+from flowborne.kernels.faces import is_finite
 from flowborne.solids.trajectories import JointCommand
 
 
@@ -110,7 +111,7 @@ def step_coupled(world: World, dt: float, command: JointCommand) -> StepReport:
     advected, dyed = advect(world, start, half.velocity, transport)  # 5
     driven_sides = far.drive(advected, cut.open, fluid)
     velocity = apply_body_force_and_sides(driven_sides, cut.open, fluid, end, dt)
-    if not all(np.isfinite(velocity[axis]).all() for axis in fluid.grid.axes):
+    if not all(is_finite(velocity[axis]) for axis in fluid.grid.axes):
         return report_failed(model, dt, Outcome.ADVECTION_NOT_FINITE)
     with timed("solids"):
         push, known = known_forces(world, pose, half.impulse, advected.jets, dt)

@@ -18,6 +18,7 @@ from flowborne.coupling.stream import winds_on
 from flowborne.coupling.world import World
 from flowborne.fluid.control_volumes import momentum_changes
 from flowborne.kernels.arrays import Array
+from flowborne.kernels.faces import is_finite
 from flowborne.solids.dynamics import Kinematics
 from flowborne.solids.flesh import Flesh
 from flowborne.solids.model import SolidModel
@@ -125,7 +126,7 @@ def report_coupled(
         "fastest": solved.fastest,
     }
     done = report_bodies(world, dt, solved, known)
-    finite = np.isfinite(solved.pressure).all()
+    finite = is_finite(solved.pressure)
     return done if finite else replace(done, outcome=Outcome.NOT_FINITE)
 
 
@@ -143,11 +144,11 @@ def momentum_budget(
     world: World, half: HalfPressure, advected: AdvectionResult, solved: SolvedFlow
 ) -> dict[str, Any]:
     """What the report says of the fluid's momentum."""
-    (fluid, _), mass = world.flow(), solved.mass
+    (fluid, _), volumes = world.flow(), advected.volumes.moving
     before, grid, boundaries = solved.before_pressure, fluid.grid, fluid.boundaries
     first = 6 * world.setup.solid.nbody
     fields = advected.velocity, before, solved.velocity
-    sums = momentum_changes(fields, mass, grid, boundaries)
+    sums = momentum_changes(fields, volumes, fluid.density, grid, boundaries)
     carried, pressed, after, taken, moved = sums
     pushes = linear(solved.impulse, first)
     exchanged = pushes.sum(axis=0)

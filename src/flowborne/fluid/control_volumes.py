@@ -110,16 +110,19 @@ def fluid_momentum(velocity: Faces, mass: Faces, grid: Grid, sides: Boundaries) 
 
 
 def momentum_changes(
-    fields: tuple[Faces, Faces, Faces], mass: Faces, grid: Grid, sides: Boundaries
+    fields: tuple[Faces, Faces, Faces],
+    volumes: Faces,
+    density: float,
+    grid: Grid,
+    sides: Boundaries,
 ) -> Array:
     """(5, 3) linear momentum with each of three velocities, what it changes by from the second to
     the third, and the sum of its parts' sizes, N s."""
     sums = np.zeros((5, 3))
     for axis in grid.axes:
         own = each_once(axis, sides)
-        sums[:, axis] = weighted_sums(
-            *(np.ascontiguousarray(f[axis][own]) for f in (mass, *fields))
-        )
+        held, *flows = (np.ascontiguousarray(f[axis][own]) for f in (volumes, *fields))
+        sums[:, axis] = weighted_sums(held, density, *flows)
     return sums
 
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from flowborne.fluid.boundary import Boundaries, Source, cells_in
 from flowborne.fluid.control_volumes import WHOLE as UNCUT
 from flowborne.fluid.ghosts import Scalar, edge
-from flowborne.fluid.grid import Grid, inner_product
+from flowborne.fluid.grid import Grid, extent, inner_product
 from flowborne.fluid.sides.side import Place
 from flowborne.fluid.transport import SUBSTEPS, Transport, parts_for
 from flowborne.kernels.arrays import Array, Integers, Marks
@@ -28,6 +28,9 @@ from flowborne.kernels.dye import CUT, WHOLE, CutCells, list_flows, pass_on, sor
 
 REACH = 2
 """Cells on both sides that the parabola in a cell is made from."""
+
+Box = tuple[slice, slice, slice]
+"""Index of some cells along each axis."""
 
 
 @dataclass(frozen=True)
@@ -125,20 +128,46 @@ class Passage:
             if self.cut.listed.size:
                 gained += self.pass_on(name, field, volume, bounds)
             order = self.grid.axes if (s % 2 == 0) != self.backwards else self.grid.axes[::-1]
+            box = self.reached(name, field)
             for axis in order:
-                ends = np.stack([self.beyond(name, field, axis, upper) for upper in (0, 1)])
-                crossed = sweep(
-                    along(field, axis, self.grid),
-                    along(volume, axis, self.grid),
-                    along(self.transport.flux[axis], axis, self.grid),
-                    along(self.clear, axis, self.grid),
-                    ends,
-                    self.sides.periodic()[axis],
-                    self.dt,
-                    bounds,
-                )
-                gained += float(crossed[0].sum() - crossed[1].sum())
+                gained += self.carry_along(axis, name, field, volume, box, bounds)
         return field, gained
+
+    def reached(self, name: str, field: Array) -> Box:
+        """The cells that hold some of a scalar, or get some from a side, with those around them,
+        farther than it flows along each axis in turn. All others stay as they are."""
+        grid, box, there = self.grid, [slice(0, n) for n in self.grid.shape], field != 0.0
+        for (scalar, axis, upper), given in self.given.items():
+            if scalar == name and given is not None:
+                there[Place(grid, axis, bool(upper)).layer] |= given != 0.0
+        for axis in grid.axes:
+            n, (first, stop) = grid.shape[axis], extent(there, axis)
+            first, stop = max(first - REACH, 0), min(stop + REACH, n)
+            if not (self.sides.periodic()[axis] and (first == 0 or stop == n)):
+                box[axis] = slice(first, stop)
+        return box[0], box[1], box[2]
+
+    def carry_along(
+        self,
+        axis: int,
+        name: str,
+        field: Array,
+        volume: Array,
+        box: Box,
+        bounds: tuple[float, float],
+    ) -> float:
+        """Carry a scalar along an axis in a box, in place; gives what came in."""
+        grid, own, faces = self.grid, box[axis], list(box)
+        faces[axis] = slice(own.start, own.stop + 1)
+        flux, marks = self.transport.flux[axis][tuple(faces)], along(self.clear[box], axis, grid)
+        within = own.start > 0, own.stop < grid.shape[axis]  # nothing comes in at such an end
+        others = tuple(c for a, c in enumerate(box) if a != axis)[:: -1 if grid.is_slab else 1]
+        ends = np.stack([self.beyond(name, field, axis, upper)[others] for upper in (0, 1)])
+        ends[np.array(within)] = 0.0
+        ring = self.sides.periodic()[axis] and not any(within)
+        values, room, through = (along(f, axis, grid) for f in (field[box], volume[box], flux))
+        crossed = sweep(values, room, through, marks, ends, ring, self.dt, bounds)
+        return float(crossed[0].sum() - crossed[1].sum())
 
     def bounds(self, name: str, values: Array) -> tuple[float, float]:
         """Least and largest value that there is or comes in."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from flowborne.kernels.arrays import Array as Array
 from flowborne.kernels.arrays import Faces as Faces
-from flowborne.kernels.arrays import Nodes
+from flowborne.kernels.arrays import Marks, Mask, Nodes
 
 
 def faces_of(values: list[Array]) -> Faces:
@@ -29,6 +29,13 @@ def inner_product(a: Array, b: Array) -> float:
 def copied(faces: Faces, grid: Grid) -> Faces:
     """A copy; what does not flow, across a slab, is the same."""
     return faces_of([faces[n].copy() if n in grid.axes else faces[n] for n in range(3)])
+
+
+def extent(marks: Mask | Marks, axis: int) -> tuple[int, int]:
+    """First layer across an axis of three in which something is marked, and the one after the last;
+    (0, 0) where nothing is."""
+    found = np.flatnonzero(marks.any(axis=tuple(a for a in range(3) if a != axis)))
+    return (int(found[0]), int(found[-1]) + 1) if found.size else (0, 0)
 
 
 @dataclass(frozen=True)

@@ -26,15 +26,17 @@ EVEN = 1e-9
 """Relative difference of masses of uncut faces: solves leave some 1e-12 in the volumes."""
 
 
-def accelerated(opened: Faces, mass: Faces, grid: Grid, boundaries: Boundaries) -> Faces:
+def accelerated(
+    opened: Faces, volumes: Faces, density: float, grid: Grid, boundaries: Boundaries
+) -> Faces:
     """a A / m of each face: what a difference of pressures accelerates it by, 1/(kg/m^2); on the
     sides of the domain the part of it that they leave to the pressure.
 
-    mass  of each face, kg; 0 where no pressure acts
+    volumes  of the fluid (kg/m^3) that moves with each face, m^3; 0 where no pressure acts
     """
     rates = grid.empty_faces()
     for axis in grid.axes:
-        accelerate(rates[axis], opened[axis], mass[axis], grid.face_area)
+        accelerate(rates[axis], opened[axis], volumes[axis], density, grid.face_area)
     for place, side in boundaries.around(grid):
         rates[place.axis][place.layer] *= side.pressure_weight(place)
     return rates
@@ -63,26 +65,34 @@ class PressureGradient:
     grid: Grid
     boundaries: Boundaries
 
-    def subtract(self, velocity: Faces, pressure: Array, scale: float) -> None:
-        """Subtract scale rate (p_upper - p_lower) on every face, in place; see
+    def subtract(
+        self, velocity: Faces, pressure: Array, scale: float, out: Faces | None = None
+    ) -> None:
+        """Subtract scale rate (p_upper - p_lower) on every face, in place if there is no `out`; see
         `subtract_gradient`."""
-        grid, periodic = self.grid, self.boundaries.periodic()
+        grid, periodic, out = self.grid, self.boundaries.periodic(), out or velocity
         p = plane(pressure, grid)
         for axis in grid.axes:
-            u, rate = plane(velocity[axis], grid), plane(self.rate[axis], grid)
-            subtract_gradient(u, rate, p, axis + grid.is_slab, scale, periodic[axis])
+            later, u, rate = (plane(f[axis], grid) for f in (out, velocity, self.rate))
+            subtract_gradient((later, u, rate), p, axis + grid.is_slab, scale, periodic[axis])
         for place, answer in self.dipoles.answer(pressure) if self.dipoles else ():
             change = scale * self.whole * answer
-            velocity[place.axis][place.layer] += change if place.upper else -change
+            out[place.axis][place.layer] += change if place.upper else -change
 
 
 def pressure_gradient(
-    opened: Faces, mass: Faces, density: float, grid: Grid, boundaries: Boundaries
+    opened: Faces, volumes: Faces, density: float, grid: Grid, boundaries: Boundaries
 ) -> PressureGradient:
-    """What pressure does to faces of these open parts and masses (kg) of a fluid (kg/m^3)."""
-    rate, dipoles = accelerated(opened, mass, grid, boundaries), boundaries.dipoles(grid)
+    """What pressure does to faces of these open parts, and volumes (m^3) that move with them, of a
+    fluid (kg/m^3)."""
+    rate, dipoles = (
+        accelerated(opened, volumes, density, grid, boundaries),
+        boundaries.dipoles(grid),
+    )
     held = 0.5 * density * grid.cell_volume
     if dipoles is not None:
-        sides = [(opened[p.axis][p.layer], mass[p.axis][p.layer]) for p in dipoles.places]
+        sides = [
+            (opened[p.axis][p.layer], density * volumes[p.axis][p.layer]) for p in dipoles.places
+        ]
         dipoles = dipoles.on([(o == 1.0) & (abs(m - held) < EVEN * held) for o, m in sides])
     return PressureGradient(rate, grid.face_area / held, dipoles, grid, boundaries)

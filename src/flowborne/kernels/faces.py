@@ -46,12 +46,12 @@ def flat(values: Array) -> Array:
 
 
 @kernel
-def accelerate(out: Array, opened: Array, mass: Array, area: float) -> None:
+def accelerate(out: Array, opened: Array, volume: Array, density: float, area: float) -> None:
     """a A / m: what a difference of pressures accelerates a face by; 0 where there is no mass."""
-    rate, part, masses = flat(out), flat(opened), flat(mass)
+    rate, part, volumes = flat(out), flat(opened), flat(volume)
     for i in prange(rate.shape[0]):
         for k in range(rate.shape[1]):
-            m = masses[i, k]
+            m = density * volumes[i, k]
             rate[i, k] = area * part[i, k] / m if m > 0.0 else 0.0
 
 
@@ -120,31 +120,46 @@ def still_to_come(out: Array, rate: Array, now: Array, was: Array, dt: float) ->
 
 
 @kernel
-def weighted_sums(weight: Array, first: Array, before: Array, after: Array) -> Array:
-    """(5,) sums of weight x each of three fields, of weight x (after - before), and of the sizes of
-    that."""
-    mass, other, low, high = flat(weight), flat(first), flat(before), flat(after)
-    parts = np.zeros((mass.shape[0], 5))
-    for i in prange(mass.shape[0]):
+def weighted_sums(
+    volume: Array, density: float, first: Array, before: Array, after: Array
+) -> Array:
+    """(5,) sums of density x volume x each of three fields, of that x (after - before), and of the
+    sizes of the last."""
+    held, other, low, high = flat(volume), flat(first), flat(before), flat(after)
+    parts = np.zeros((held.shape[0], 5))
+    for i in prange(held.shape[0]):
         rows = np.zeros((5, LANES))
         ones, lows, highs, changes, sizes = rows[0], rows[1], rows[2], rows[3], rows[4]
-        for at in range(0, mass.shape[1], LANES):
-            lane = slice(at, min(at + LANES, mass.shape[1]))
-            m, a, b, c = mass[i, lane], other[i, lane], low[i, lane], high[i, lane]
-            for k in range(m.size):
-                change = m[k] * (c[k] - b[k])
-                ones[k] += m[k] * a[k]
-                lows[k] += m[k] * b[k]
-                highs[k] += m[k] * c[k]
+        for at in range(0, held.shape[1], LANES):
+            lane = slice(at, min(at + LANES, held.shape[1]))
+            v, a, b, c = held[i, lane], other[i, lane], low[i, lane], high[i, lane]
+            for k in range(v.size):
+                m = density * v[k]
+                change = m * (c[k] - b[k])
+                ones[k] += m * a[k]
+                lows[k] += m * b[k]
+                highs[k] += m * c[k]
                 changes[k] += change
                 sizes[k] += abs(change)
         for n in range(5):
             for k in range(LANES):
                 parts[i, n] += rows[n, k]
     total = np.zeros(5)
-    for i in range(mass.shape[0]):
+    for i in range(held.shape[0]):
         total += parts[i]
     return total
+
+
+@kernel
+def is_finite(field: Array) -> bool:
+    """Whether all values of a field are finite numbers."""
+    values, wrong = flat(field), np.zeros(field.shape[0], np.int64)
+    for i in prange(values.shape[0]):
+        found = 0
+        for k in range(values.shape[1]):
+            found += int(not abs(values[i, k]) < np.inf)
+        wrong[i] = found
+    return not wrong.any()
 
 
 @kernel

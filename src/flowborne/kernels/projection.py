@@ -14,6 +14,8 @@ from flowborne.kernels.dye import face_of
 from flowborne.kernels.jit import inlined, kernel
 
 Volumes = tuple[Array, Array, Array, Array]
+Fields = tuple[Array, Array, Array]
+Box = tuple[tuple[int, int], tuple[int, int], tuple[int, int]]
 
 
 @kernel
@@ -52,11 +54,53 @@ def mark_unsettled(
 
 
 @inlined
-def push(
-    velocity: Array, rate: Array, i: int, j: int, k: int, scale: float, difference: float
-) -> None:
+def surplus(flux: Faces, volumes: Volumes, i: int, j: int, k: int, dt: float) -> float:
+    """Volume per time by which fluxes fill a cell too much; see `mark_unsettled`."""
+    (start, rate, _, end), (qx, qy, qz) = volumes, flux
+    deep = qx.shape[0] - start.shape[0]
+    net = qx[i + deep, j, k] - qx[i, j, k] + qy[i, j + 1, k] - qy[i, j, k]
+    net += qz[i, j, k + 1] - qz[i, j, k]
+    return (start[i, j, k] - end[i, j, k]) / dt + rate[i, j, k] - net
+
+
+@kernel
+def fill_around(flux: Faces, volumes: Volumes, box: Box, dt: float) -> None:
+    """Let fluxes fill the cells outside a box in dt, in place: each passes its surplus on towards
+    the box, along one axis after the other.
+
+    volumes  as in `mark_unsettled`
+    box      first cell along each axis, and the one after the last
+    """
+    (n0, n1, n2), ((a0, b0), (a1, b1), (a2, b2)) = volumes[0].shape, box
+    for line in prange(n1 if n0 > b0 - a0 else 0):
+        row, qx = np.int64(line), flux[0]  # from within: a loop's arrays count as different ones
+        for i in range(a0):
+            for k in range(n2):
+                qx[i + 1, row, k] += surplus(flux, volumes, i, row, k, dt)
+        for i in range(n0 - 1, b0 - 1, -1):
+            for k in range(n2):
+                qx[i, row, k] -= surplus(flux, volumes, i, row, k, dt)
+    for line in prange(b0 - a0):
+        row, qy, qz = a0 + np.int64(line), flux[1], flux[2]
+        for j in range(a1):
+            for k in range(n2):
+                qy[row, j + 1, k] += surplus(flux, volumes, row, j, k, dt)
+        for j in range(n1 - 1, b1 - 1, -1):
+            for k in range(n2):
+                qy[row, j, k] -= surplus(flux, volumes, row, j, k, dt)
+        for j in range(a1, b1):
+            for k in range(a2):
+                qz[row, j, k + 1] += surplus(flux, volumes, row, j, k, dt)
+            for k in range(n2 - 1, b2 - 1, -1):
+                qz[row, j, k] -= surplus(flux, volumes, row, j, k, dt)
+
+
+@inlined
+def push(fields: Fields, i: int, j: int, k: int, scale: float, difference: float) -> None:
     """`subtract_gradient` on one face, between two cells of this difference in pressure."""
-    velocity[i, j, k] -= 0.0 if rate[i, j, k] == 0.0 else scale * rate[i, j, k] * difference
+    out, velocity, rate = fields
+    change = 0.0 if rate[i, j, k] == 0.0 else scale * rate[i, j, k] * difference
+    out[i, j, k] = velocity[i, j, k] - change
 
 
 @kernel
@@ -84,19 +128,19 @@ def open_outflow(out: Array, opened: Faces, velocity: Faces, rate: Array, area: 
 
 @kernel
 def subtract_gradient(
-    velocity: Array, rate: Array, pressure: Array, axis: int, scale: float, periodic: bool
+    fields: Fields, pressure: Array, axis: int, scale: float, periodic: bool
 ) -> None:
-    """Subtract scale rate (p_upper - p_lower) from the velocity of the faces across `axis`.
+    """Give faces across `axis` their velocity less scale rate (p_upper - p_lower).
 
-    rate      a A / m; faces of which it is 0, as on sides that prescribe the flux, keep their
-              velocity
+    fields    for the result, which may be the velocity itself; the velocity; and the rate a A / m:
+              faces of which it is 0, as on sides that prescribe the flux, keep their velocity
     scale     dt for a pressure, 1 for p^
     periodic  whether the domain is along the axis; else the pressure beyond the sides is 0
     """
-    n, wide = pressure.shape[axis], velocity.shape[2]
-    for row in prange(velocity.shape[0]):
+    n, wide = pressure.shape[axis], fields[0].shape[2]
+    for row in prange(fields[0].shape[0]):
         i = np.int64(row)  # that of a thread has no sign
-        for j in range(velocity.shape[1]):
+        for j in range(fields[0].shape[1]):
             at = i if axis == 0 else j
             below, above = at - 1 if at > 0 else n - 1, at if at < n else 0
             i0, i1 = (below, above) if axis == 0 else (i, i)
@@ -104,20 +148,20 @@ def subtract_gradient(
             if axis == 2:
                 for k in range(1, n):
                     difference = pressure[i, j, k] - pressure[i, j, k - 1]
-                    push(velocity, rate, i, j, k, scale, difference)
+                    push(fields, i, j, k, scale, difference)
                 first, last = pressure[i, j, 0], pressure[i, j, n - 1]
-                push(velocity, rate, i, j, 0, scale, first - last if periodic else first)
-                push(velocity, rate, i, j, n, scale, first - last if periodic else -last)
+                push(fields, i, j, 0, scale, first - last if periodic else first)
+                push(fields, i, j, n, scale, first - last if periodic else -last)
             elif periodic or 0 < at < n:
                 for k in range(wide):
                     difference = pressure[i1, j1, k] - pressure[i0, j0, k]
-                    push(velocity, rate, i, j, k, scale, difference)
+                    push(fields, i, j, k, scale, difference)
             elif at == 0:
                 for k in range(wide):
-                    push(velocity, rate, i, j, k, scale, pressure[i, j, k])
+                    push(fields, i, j, k, scale, pressure[i, j, k])
             else:
                 for k in range(wide):
-                    push(velocity, rate, i, j, k, scale, -pressure[i0, j0, k])
+                    push(fields, i, j, k, scale, -pressure[i0, j0, k])
 
 
 @njit(nogil=True, cache=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import prange
 
-from flowborne.kernels.arrays import Array, Finest, Labels, Periodic, Rows
+from flowborne.kernels.arrays import Array, Finest, Labels, Marks, Periodic, Rows
 from flowborne.kernels.jit import inlined, kernel
 
 NULL = 1e-10
@@ -52,11 +52,12 @@ def is_crossed(w: Array, i: int, j: int) -> bool:
 
 @kernel
 def label_regions(
-    finest: Finest, periodic: Periodic, label: Labels, parent: Labels, count: Labels
+    finest: Finest, even: Marks, periodic: Periodic, label: Labels, parent: Labels, count: Labels
 ) -> int:
     """Number the regions that have no open side.
 
     finest    padded weights and diagonal of the finest level (see `levels`)
+    even      which of its padded rows are even (see `even`)
     label     padded: filled with 0, 1, ... in regions without an open side, -1 elsewhere
     parent    scratch, one entry per padded cell and one more
     count     filled with the cells of each such region
@@ -71,7 +72,7 @@ def label_regions(
     whole = np.zeros((p0, p1), np.bool_)  # rows of one run, which need no look at every cell
     for i in range(d, p0 - d):
         for j in range(1, p1 - 1):
-            whole[i, j] = is_whole(w2, diagonal, i, j)
+            whole[i, j] = even[i, j] or is_whole(w2, diagonal, i, j)
             above = whole[i, j - 1] and is_crossed(w1, i, j)
             before = d == 0 or (whole[i - 1, j] and is_crossed(w0, i, j))
             if whole[i, j] and above and before:

@@ -21,6 +21,7 @@ from flowborne.coupling.stream import FlowState, flow_at
 from flowborne.coupling.world import Setup, World
 from flowborne.fluid.boundary import SIDES
 from flowborne.kernels.arrays import PRESCRIBED, Array, Integers, Mask
+from flowborne.kernels.faces import is_finite
 from flowborne.kernels.jit import LARGE, cores, kernel_threads
 from flowborne.runs.summary import BUDGET_OPEN
 from flowborne.scenes.changes import ChangeTable, values_at
@@ -408,7 +409,7 @@ def trouble(world: World, report: StepReport) -> str | None:
     if left:
         return left
     grid = properties.grid
-    if not all(np.isfinite(values).all() for values in (*fluid.velocity, fluid.pressure)):
+    if not all(map(is_finite, (*fluid.velocity, fluid.pressure))):
         return Outcome.NOT_FINITE.value
     longest, moved = max(grid.shape) * grid.spacing, report.fastest * report.dt
     if moved > longest:

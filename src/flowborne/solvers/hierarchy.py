@@ -98,8 +98,8 @@ class Buffers:
                   the finest level
         """
         scale, common = fill_levels(self.hierarchy, faces, reaction, self.finest)
-        regions = label_regions(self.finest, self.periodic, self.label, self.parent, self.count)
-        even = even_at(self.even, self.table, 0)
+        even, labels = even_at(self.even, self.table, 0), (self.label, self.parent, self.count)
+        regions = label_regions(self.finest, even, self.periodic, *labels)
         return regions, scale, (*self.finest, even, int(common))
 
 

@@ -177,7 +177,7 @@ class PressureSystem:
             matrix, cycle, b.vectors, tolerance, absolute, guessed, applied
         )
         pressure = x[self.inside].copy().reshape(self.shape)
-        self._applied = pressure if pressure.any() else None
+        self._applied = pressure if iterations > 0 or pressure.any() else None
         return PressureSolution(pressure, int(iterations), float(residual), bool(converged))
 
     def closed_regions(self) -> Indices:
