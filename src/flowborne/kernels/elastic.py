@@ -18,10 +18,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from flowborne.kernels.arrays import Array, Integers
+from flowborne.kernels.arrays import Array, Indices, Integers
 from flowborne.kernels.jit import kernel
 
 Elements = tuple[Integers, Array, Array, Array, Integers]
+Sparse = tuple[Indices, Indices, Array]
+"""A matrix by rows: where they begin, columns, values."""
 
 SAINT_VENANT_KIRCHHOFF, STABLE_NEO_HOOKEAN = 0, 1
 
@@ -294,6 +296,48 @@ def add_stiffness(
                         values[np.uint64(above + m * across + n)] += block[a, m, n, b]
                         if a != b:
                             values[np.uint64(below + n * along + m)] += block[a, m, n, b]
+
+
+@kernel
+def congruent(
+    values: Array, start: Indices, column: Indices, K: Sparse, J: Sparse, bones: Integers
+) -> None:
+    """Add J^T K J for a symmetric K to the entries of a symmetric sparse matrix that has them.
+
+    values, start, column  rows of the matrix, whose columns ascend
+    bones                  (m,) unknowns that move many rows of J, in which no other has an entry
+    """
+    n, count = start.size - 1, bones.size
+    number, total = np.full(n, -1), np.zeros(n)  # total: a row of K J
+    number[bones] = np.arange(count)
+    held = np.empty(J[0].size - 1, np.bool_)
+    for i in range(held.size):
+        held[i] = J[0][i] == J[0][i + 1] or number[J[1][J[0][i]]] >= 0
+    across = np.zeros((count, n))  # rows of bones
+    for i in range(held.size):
+        for e in range(K[0][i], K[0][i + 1]):
+            j, x = K[1][e], K[2][e]
+            if held[j] or not held[i]:
+                for f in range(J[0][j], J[0][j + 1]):
+                    total[J[1][f]] += x * J[2][f]
+        for f in range(J[0][i], J[0][i + 1]):
+            p, x = J[1][f], J[2][f]
+            if held[i]:
+                for b in bones:
+                    across[number[p], b] += x * total[b]
+                continue
+            for e in range(start[p], start[p + 1]):
+                values[e] += x * total[column[e]]
+            for b in range(count):
+                across[b, p] += x * total[bones[b]]
+        for f in range(J[0][i], J[0][i + 1]):
+            if not held[i]:
+                for e in range(start[J[1][f]], start[J[1][f] + 1]):
+                    total[column[e]] = 0.0
+        total[bones] = 0.0
+    for b in range(count):
+        for e in range(start[bones[b]], start[bones[b] + 1]):
+            values[e] += across[b, column[e]]
 
 
 @kernel

@@ -29,11 +29,10 @@ from typing import Any, Self
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
-from scipy.sparse import coo_array, csc_array, csr_array
+from scipy.sparse import csc_array, csr_array
 
 from flowborne.kernels.arrays import Array, Integers, Mask
 from flowborne.solids.dynamics import Kinematics
-from flowborne.solids.flesh import Flesh
 from flowborne.solids.flesh_dynamics import FleshSystem
 from flowborne.solids.model import SolidModel
 from flowborne.solids.prescribed import Driven
@@ -49,53 +48,12 @@ def ordered(model: SolidModel, free: Integers) -> Ordering:
 
     It is computed once per model and set of free dofs.
     """
+    assert model.flesh is not None
     found = model.orderings
     key = free.tobytes()
     if key not in found:
-        found[key] = ordering_of(csc_array(pattern(model)[free][:, free]))
+        found[key] = ordering_of(csc_array(model.flesh.pattern.matrix[free][:, free]))
     return found[key]
-
-
-def pattern(model: SolidModel) -> csr_array:
-    """(nv, nv) ones where two dofs can couple: dofs of a chain, of a tendon, and dofs that move
-    nodes of one element."""
-    assert model.flesh is not None
-    groups = [moving(model, model.flesh), chains(model), tendons(model)]
-    return csr_array(sum(g.T @ g for g in groups) > 0).astype(np.float64)
-
-
-def moving(model: SolidModel, flesh: Flesh) -> csr_array:
-    """(elements, nv) which dofs move an element."""
-    node, dof = flesh.moved
-    moves = _ones(node, dof, (len(flesh.body), model.nv))
-    count, corners = flesh.elements.shape
-    of = np.repeat(np.arange(count), corners)
-    return _ones(of, flesh.elements.ravel(), (count, len(flesh.body))) @ moves
-
-
-def chains(model: SolidModel) -> csr_array:
-    """(nv, nv) for each dof, itself and the dofs between it and the world."""
-    parent, nv = model.mj.dof_parentid, model.nv
-    pairs = []
-    for dof in range(nv):
-        above = dof
-        while above >= 0:
-            pairs.append((dof, above))
-            above = int(parent[above])
-    behind, before = np.array(pairs, np.int64).reshape(-1, 2).T
-    return _ones(behind, before, (nv, nv))
-
-
-def tendons(model: SolidModel) -> csr_array:
-    """(tendons, nv) which dofs move a tendon."""
-    mj = model.mj
-    start = np.concatenate([[0], np.cumsum(mj.ten_J_rownnz)])
-    values = np.ones(int(start[-1]))
-    return csr_array((values, mj.ten_J_colind[: len(values)], start), (mj.ntendon, model.nv))
-
-
-def _ones(row: Integers, column: Integers, shape: tuple[int, int]) -> csr_array:
-    return coo_array((np.ones(len(row)), (row, column)), shape=shape).tocsr()
 
 
 @dataclass(frozen=True)
