@@ -179,7 +179,7 @@ def solve_together(
     gradient, matrix = pressure_on(world, volumes, cut, mobility)
     pressure = dt * state.pressure
     tolerance = fluid.tolerance
-    if correct_under(pressure, cut, pose, driven, torque_limit) is not None:
+    if changes_under(pressure, cut, pose, driven, torque_limit):
         tolerance = max(tolerance, TIGHTENING)
     rate = source_rate(fluid, world.time + dt, cut.open)
     add_rates(rate, jets)
@@ -294,14 +294,15 @@ def added_mass_impulse(matrix: Callable[[], PressureSystem], cut: Geometry, chan
     return pressure_push(cut, solution.pressure, change.size)
 
 
-def correct_under(
+def changes_under(
     pressure: Array, cut: Geometry, pose: Kinematics, driven: Driven, torque_limit: Array
-) -> Driven | None:
-    """What `correct` gives under a pressure p^ (nx, ny, nz), Pa s."""
+) -> bool:
+    """Whether `correct` changes the bodies under a pressure p^ (nx, ny, nz), Pa s."""
     size = pose.twist_jacobian.shape[0] * 6 + pose.vertices.size
     impulse = generalised(pose, pressure_push(cut, pressure, size))
     v = driven.after(impulse)
-    return correct(driven, v, driven.actuator(v, impulse), torque_limit)
+    weak = within_limits(driven, torque_limit, v, driven.actuator(v, impulse))
+    return weak is not None or driven.system.updated(v) is not None
 
 
 def give_way(cut: Geometry, mobility: Mobility, grid: Grid) -> Array:

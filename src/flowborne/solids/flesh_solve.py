@@ -83,9 +83,8 @@ class PrescribedFlesh(Driven):
 
     def mobility(self, pose: Kinematics) -> Mobility:
         T = csr_array(pose.jacobian[:, self.free])
-        return factored_mobility(
-            T, self.factor, self._constraints(), T @ self._soft(pose.twist_rows)
-        )
+        soft = self._soft(pose.moves[:, self.free])
+        return factored_mobility(T, self.factor, self._constraints(), T @ soft)
 
     def answering(self, pose: Kinematics, drag: Drag) -> SparseAnswer:
         J, D, _ = self.system.acting()
@@ -100,12 +99,12 @@ class PrescribedFlesh(Driven):
             return Y
         return np.asarray(solve_triangular(np.tril(small[0]), Y.T, lower=True).T)
 
-    def _soft(self, jacobian: Array) -> Array:
+    def _soft(self, moves: Mask) -> Array:
         """(nf, m) Z with Z Z^T the part of B_FF^-1 that moves bones, with flesh responding freely.
 
-        jacobian  (6 nbody, nv) from v to the twists of the bones
+        moves  (nbody, nf) which dofs move bones
         """
-        bones = np.flatnonzero(np.abs(jacobian[:, self.free]).max(axis=0, initial=0.0) > 0.0)
+        bones = np.flatnonzero(moves.any(axis=0))
         unit = np.zeros((len(self.free), len(bones)))
         unit[bones, np.arange(len(bones))] = 1.0
         answers = _solve(self.factor, self.rows, unit) if len(bones) else unit
