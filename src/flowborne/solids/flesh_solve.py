@@ -29,7 +29,7 @@ from typing import Any, Self
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
-from scipy.sparse import csc_array, csr_array
+from scipy.sparse import csr_array
 
 from flowborne.kernels.arrays import Array, Integers, Mask
 from flowborne.solids.dynamics import Kinematics
@@ -52,7 +52,7 @@ def ordered(model: SolidModel, free: Integers) -> Ordering:
     found = model.orderings
     key = free.tobytes()
     if key not in found:
-        found[key] = ordering_of(csc_array(model.flesh.pattern.matrix[free][:, free]))
+        found[key] = ordering_of(model.flesh.pattern.matrix, free)
     return found[key]
 
 
@@ -140,7 +140,7 @@ def prescribe_flesh(system: FleshSystem, prescribed: Mask, hold: Array) -> Presc
 
 def factored(system: FleshSystem, free: Integers) -> Cholesky:
     """The factor of A_FF for the free dofs (nf,)."""
-    return cholesky(system.A, free, ordered(system.model, free))
+    return cholesky(system.A.data, ordered(system.model, free))
 
 
 def _damped(system: FleshSystem, free: Integers, factor: Cholesky) -> FleshSystem:
