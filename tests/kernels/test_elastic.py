@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.sparse import csr_array, random_array
 from scipy.spatial.transform import Rotation
 
 from flowborne.kernels.arrays import Array
@@ -12,6 +13,7 @@ from flowborne.kernels.elastic import (
     STABLE_NEO_HOOKEAN,
     Elements,
     add_stiffness,
+    congruent,
     elastic_energy,
     elastic_forces,
     singular_values,
@@ -115,3 +117,19 @@ def test_singular_values_of_any_matrix() -> None:
         expected = np.linalg.svd(F, compute_uv=False)
         np.testing.assert_allclose(np.abs(sigma), expected, atol=1e-7)
         assert sigma[0] >= sigma[1] >= abs(sigma[2]) - 1e-7
+
+
+def test_a_stiffness_between_nodes_becomes_one_between_dofs() -> None:
+    """Rows 0 to 8 move with dofs of their own, in turned axes; others with bones or not at all."""
+    rng = np.random.default_rng(4)
+    half = random_array((15, 15), density=0.2, rng=rng)
+    K, J = csr_array(half + half.T), np.zeros((15, 11))
+    for n in range(0, 9, 3):
+        J[n : n + 3, n : n + 3] = Rotation.random(rng=rng).as_matrix()
+    J[9:13, 9:] = rng.standard_normal((4, 2))
+    moving = csr_array(J)
+    pattern = csr_array(np.ones((11, 11)))
+    values = np.zeros(pattern.nnz)
+    parts = [(m.indptr, m.indices, m.data) for m in (K, moving)]
+    congruent(values, pattern.indptr, pattern.indices, *parts, np.array([9, 10]))
+    np.testing.assert_allclose(values.reshape(11, 11), J.T @ K.toarray() @ J, atol=1e-14)

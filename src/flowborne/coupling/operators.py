@@ -42,8 +42,8 @@ def generalised(kinematics: Kinematics, push: Array) -> Array:
         wrenches = push.reshape(-1, 6)
         return np.asarray(np.einsum("bwv,bw->v", kinematics.twist_jacobian, wrenches))
     first = push.size - kinematics.vertices.size
-    on_bones = kinematics.bone_jacobian.T @ push[:first]
-    return np.asarray(on_bones + kinematics.vertex_jacobian.T @ push[first:])
+    from_bones, from_vertices = kinematics.transposed
+    return np.asarray(from_bones @ push[:first] + from_vertices @ push[first:])
 
 
 def leak_proof(velocity: Faces, geometry: Geometry, moving: Array, grid: Grid) -> Faces:

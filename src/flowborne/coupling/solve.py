@@ -53,9 +53,10 @@ from flowborne.solvers.pressure import NO_REACTION, NO_TERM, LowRankTerm, Pressu
 PASSES = 50
 """Most times that contacts, torque limits and Coriolis forces are corrected in one step."""
 
-TIGHTENING = 1e-3
-"""Relative residual of the first of several solves of one step, and tolerance of each later one
-over that of the one before: what a correction changes shrinks as fast."""
+ROUGH = 1e-3
+"""Relative residual of the first of several solves of one step, whose bodies are corrected anyway.
+The next has the full tolerance, and those after it go on from there: their corrections are small.
+"""
 
 SPLIT_TOLERANCE = 1e-3
 """Relative residual of the added-mass part of the pressure, whose forces are then off by 2e-4 at
@@ -177,8 +178,8 @@ def solve_together(
     gradient, matrix = pressure_on(world, volumes, cut, mobility)
     pressure = dt * state.pressure
     tolerance = fluid.tolerance
-    if correct_under(pressure, cut, pose, driven, torque_limit) is not None:
-        tolerance = max(tolerance, TIGHTENING)
+    if changes_under(pressure, cut, pose, driven, torque_limit):
+        tolerance = max(tolerance, ROUGH)
     rate = source_rate(fluid, world.time + dt, cut.open)
     add_rates(rate, jets)
     smooth, viscous, smoothed = diffuse(world, velocity, volumes, gradient, cut, jets, pose, driven)
@@ -208,7 +209,7 @@ def solve_together(
                 )
                 open_outflow(net, cut.open, smooth, rate, area)
             tried, driven = driven, changed
-        tolerance = max(fluid.tolerance, TIGHTENING * tolerance)
+        tolerance = fluid.tolerance
         pressure = solution.pressure
     after = fluid.grid.empty_faces()
     gradient.subtract(smooth, solution.pressure, 1.0, after)
@@ -294,14 +295,15 @@ def added_mass_impulse(matrix: Callable[[], PressureSystem], cut: Geometry, chan
     return pressure_push(cut, solution.pressure, change.size)
 
 
-def correct_under(
+def changes_under(
     pressure: Array, cut: Geometry, pose: Kinematics, driven: Driven, torque_limit: Array
-) -> Driven | None:
-    """What `correct` gives under a pressure p^ (nx, ny, nz), Pa s."""
+) -> bool:
+    """Whether `correct` changes the bodies under a pressure p^ (nx, ny, nz), Pa s."""
     size = pose.twist_jacobian.shape[0] * 6 + pose.vertices.size
     impulse = generalised(pose, pressure_push(cut, pressure, size))
     v = driven.after(impulse)
-    return correct(driven, v, driven.actuator(v, impulse), torque_limit)
+    weak = within_limits(driven, torque_limit, v, driven.actuator(v, impulse))
+    return weak is not None or driven.system.updated(v) is not None
 
 
 def give_way(cut: Geometry, mobility: Mobility, grid: Grid) -> Array:

@@ -16,50 +16,30 @@ from flowborne.kernels.jit import kernel
 
 
 @kernel
-def factorise(
-    value: Array, blocks: Blocks, place: Integers, start: Indices, row: Indices, entry: Array
-) -> int:
-    """L of a matrix by columns (start, row, entry), whose unknown i is number place[i] in L, or is
-    left out where that is -1.
+def factorise(value: Array, blocks: Blocks, within: Indices, slot: Integers, entry: Array) -> bool:
+    """L of the matrix of these entries; False when it is not positive definite.
 
-    value    of L, set; see `Blocks`
-    returns  0; 1 when the matrix has an entry that the blocks have no room for, 2 when it is not
-             positive definite
+    value   of L, set; see `Blocks`
+    within  see `give_update`
+    slot    where in `value` each entry belongs, -1 for none
     """
-    first, below, rows, at, owner = blocks
-    n, count = owner.size, first.size - 1
-    where = np.full(n, -1, np.int32)
-    column = np.empty(n, np.int32)
-    for i in range(place.size):
-        if place[i] >= 0:
-            column[place[i]] = i
+    first, below, _, at, _ = blocks
     value[:] = 0.0
-    most = 0
-    for s in range(count):
-        begin, end, r0, m = first[s], first[s + 1], below[s], below[s + 1] - below[s]
-        w, most = end - begin, max(most, m)
-        for k in range(m):
-            where[rows[r0 + k]] = k
-        for c in range(begin, end):
-            own, lower = at[s] + (c - begin) * w, at[s] + w * w + (c - begin) * m
-            for e in range(start[column[c]], start[column[c] + 1]):
-                r = place[row[e]]
-                if r >= end:
-                    k = where[r]
-                    if not (0 <= k < m and rows[r0 + k] == r):
-                        return 1
-                    value[lower + k] = entry[e]
-                elif r >= c:
-                    value[own + r - begin] = entry[e]
+    for e in range(entry.size):
+        if slot[e] >= 0:
+            value[slot[e]] = entry[e]
+    most, used = 0, 0
+    for s in range(first.size - 1):
+        most = max(most, below[s + 1] - below[s])
     update = np.empty(most * most)
-    for s in range(count):
+    for s in range(first.size - 1):
         m, w = below[s + 1] - below[s], first[s + 1] - first[s]
         if not factor_block(value[at[s] : at[s + 1]], w, m):
-            return 2
+            return False
         panel = value[at[s] + w * w : at[s + 1]]
         multiply_panel(update, panel, w, m)
-        give_update(value, blocks, s, update, where)
-    return 0
+        used += give_update(value, blocks, s, update, within[used:])
+    return True
 
 
 @kernel
@@ -115,22 +95,23 @@ def multiply_panel(update: Array, panel: Array, w: int, m: int) -> None:
 
 
 @kernel
-def give_update(value: Array, blocks: Blocks, s: int, update: Array, where: Indices) -> None:
-    """Take the update of block s from the columns that its rows are."""
+def give_update(value: Array, blocks: Blocks, s: int, update: Array, within: Indices) -> int:
+    """Take the update of block s from the columns that its rows are.
+
+    within   for each block that has such columns: where in its rows those of block s beyond it are
+    returns  how many of these were used
+    """
     first, below, rows, at, owner = blocks
     shared = rows[below[s] : below[s + 1]]
-    m, i = shared.size, 0
+    m, i, used = shared.size, 0, 0
     while i < m:
         target, inner = owner[shared[i]], i
         begin, end = first[target], first[target + 1]
         w, height = end - begin, below[target + 1] - below[target]
-        for k in range(height):
-            where[rows[below[target] + k]] = k
         while inner < m and shared[inner] < end:
             inner += 1
-        place = np.empty(m - inner, np.uint32)
-        for j in range(m - inner):
-            place[j] = where[shared[inner + j]]
+        place = within[used : used + m - inner]
+        used += m - inner
         together = place.size > 0 and place[-1] - place[0] == place.size - 1
         for row in range(i, inner):
             c, mine = shared[row] - begin, update[row * m : (row + 1) * m]
@@ -145,8 +126,9 @@ def give_update(value: Array, blocks: Blocks, s: int, update: Array, where: Indi
                     across[j] -= taken[j]
             else:
                 for j in range(taken.size):
-                    lower[place[j]] -= taken[j]
+                    lower[np.uint32(place[j])] -= taken[j]
         i = inner
+    return used
 
 
 @kernel
@@ -184,13 +166,12 @@ def forwards(x: Array, begin: int, end: int, shared: Indices, block: Array, work
             here[r] -= own[r] * here[c]
     part[:] = 0.0
     c = 0
-    while c + 3 < w:
+    while c + 2 < w:
         p0, p1 = panel[c * m : (c + 1) * m], panel[(c + 1) * m : (c + 2) * m]
-        p2, p3 = panel[(c + 2) * m : (c + 3) * m], panel[(c + 3) * m : (c + 4) * m]
-        y0, y1, y2, y3 = here[c], here[c + 1], here[c + 2], here[c + 3]
+        p2, y0, y1, y2 = panel[(c + 2) * m : (c + 3) * m], here[c], here[c + 1], here[c + 2]
         for k in range(m):
-            part[k] = (((part[k] + p0[k] * y0) + p1[k] * y1) + p2[k] * y2) + p3[k] * y3
-        c += 4
+            part[k] = ((part[k] + p0[k] * y0) + p1[k] * y1) + p2[k] * y2
+        c += 3
     while c < w:
         p0, y0 = panel[c * m : (c + 1) * m], here[c]
         for k in range(m):
@@ -207,17 +188,37 @@ def backwards(x: Array, begin: int, end: int, shared: Indices, block: Array, wor
     here, part, whole = x[begin:end], work[:m], m // 4 * 4
     for k in range(m):
         part[k] = x[np.uint32(shared[k])]
-    for c in range(w):
+    c = 0
+    while c + 2 < w:
+        low = w * w + c * m
+        a, b, d = block[low : low + m], block[low + m : low + 2 * m], block[low + 2 * m :]
+        t0, t1, t2, t3 = 0.0, 0.0, 0.0, 0.0
+        u0, u1, u2, u3 = 0.0, 0.0, 0.0, 0.0
+        v0, v1, v2, v3 = 0.0, 0.0, 0.0, 0.0
+        for k in range(0, whole, 4):
+            p0, p1, p2, p3 = part[k], part[k + 1], part[k + 2], part[k + 3]
+            t0, t1 = t0 + a[k] * p0, t1 + a[k + 1] * p1
+            t2, t3 = t2 + a[k + 2] * p2, t3 + a[k + 3] * p3
+            u0, u1 = u0 + b[k] * p0, u1 + b[k + 1] * p1
+            u2, u3 = u2 + b[k + 2] * p2, u3 + b[k + 3] * p3
+            v0, v1 = v0 + d[k] * p0, v1 + d[k + 1] * p1
+            v2, v3 = v2 + d[k + 2] * p2, v3 + d[k + 3] * p3
+        for k in range(whole, m):
+            t0, u0, v0 = t0 + a[k] * part[k], u0 + b[k] * part[k], v0 + d[k] * part[k]
+        here[c] -= (t0 + t1) + (t2 + t3)
+        here[c + 1] -= (u0 + u1) + (u2 + u3)
+        here[c + 2] -= (v0 + v1) + (v2 + v3)
+        c += 3
+    while c < w:
         lower = block[w * w + c * m : w * w + (c + 1) * m]
         t0, t1, t2, t3 = 0.0, 0.0, 0.0, 0.0
         for k in range(0, whole, 4):
-            t0 += lower[k] * part[k]
-            t1 += lower[k + 1] * part[k + 1]
-            t2 += lower[k + 2] * part[k + 2]
-            t3 += lower[k + 3] * part[k + 3]
+            t0, t1 = t0 + lower[k] * part[k], t1 + lower[k + 1] * part[k + 1]
+            t2, t3 = t2 + lower[k + 2] * part[k + 2], t3 + lower[k + 3] * part[k + 3]
         for k in range(whole, m):
             t0 += lower[k] * part[k]
         here[c] -= (t0 + t1) + (t2 + t3)
+        c += 1
     for c in range(w - 1, -1, -1):
         own = block[c * w : (c + 1) * w]
         total = here[c]

@@ -18,10 +18,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from flowborne.kernels.arrays import Array, Integers
+from flowborne.kernels.arrays import Array, Indices, Integers
 from flowborne.kernels.jit import kernel
 
 Elements = tuple[Integers, Array, Array, Array, Integers]
+Sparse = tuple[Indices, Indices, Array]
+"""A matrix by rows: where they begin, columns, values."""
 
 SAINT_VENANT_KIRCHHOFF, STABLE_NEO_HOOKEAN = 0, 1
 
@@ -183,8 +185,11 @@ def singular_values(F: Array, U: Array, V: Array, sigma: Array) -> None:
         sigma[:] = 0.0
         U[:] = V
         return
-    U[:, 0] /= sigma[0]
-    U[:, 1] -= (U[0, 0] * U[0, 1] + U[1, 0] * U[1, 1] + U[2, 0] * U[2, 1]) * U[:, 0]
+    for i in range(3):
+        U[i, 0] /= sigma[0]
+    share = U[0, 0] * U[0, 1] + U[1, 0] * U[1, 1] + U[2, 0] * U[2, 1]
+    for i in range(3):
+        U[i, 1] -= share * U[i, 0]
     sigma[1] = np.sqrt(U[0, 1] ** 2 + U[1, 1] ** 2 + U[2, 1] ** 2)
     if sigma[1] <= 1e-12 * sigma[0]:
         k = int(np.argmin(np.abs(U[:, 0])))
@@ -192,7 +197,8 @@ def singular_values(F: Array, U: Array, V: Array, sigma: Array) -> None:
         U[k, 1] += 1.0
         U[:, 1] /= np.sqrt(U[0, 1] ** 2 + U[1, 1] ** 2 + U[2, 1] ** 2)
     else:
-        U[:, 1] /= sigma[1]
+        for i in range(3):
+            U[i, 1] /= sigma[1]
     x, y, z = U[0, 2], U[1, 2], U[2, 2]
     U[0, 2] = U[1, 0] * U[2, 1] - U[2, 0] * U[1, 1]
     U[1, 2] = U[2, 0] * U[0, 1] - U[0, 0] * U[2, 1]
@@ -231,12 +237,11 @@ def principal_moduli(sigma: Array, mu: float, lame: float, law: int, H: Array, R
                 R[i, j], R[j, i] = 0.5 * (shear + turn), 0.5 * (shear - turn)
     axes = np.empty((3, 3))
     diagonalise(H, axes)
-    share = np.array([max(H[0, 0], 0.0), max(H[1, 1], 0.0), max(H[2, 2], 0.0)])
+    x, y, z = max(H[0, 0], 0.0), max(H[1, 1], 0.0), max(H[2, 2], 0.0)
     for i in range(3):
         for j in range(3):
-            H[i, j] = 0.0
-            for k in range(3):
-                H[i, j] += axes[i, k] * share[k] * axes[j, k]
+            first, second = axes[i, 0] * x * axes[j, 0], axes[i, 1] * y * axes[j, 1]
+            H[i, j] = first + second + axes[i, 2] * z * axes[j, 2]
 
 
 @kernel
@@ -294,6 +299,48 @@ def add_stiffness(
                         values[np.uint64(above + m * across + n)] += block[a, m, n, b]
                         if a != b:
                             values[np.uint64(below + n * along + m)] += block[a, m, n, b]
+
+
+@kernel
+def congruent(
+    values: Array, start: Indices, column: Indices, K: Sparse, J: Sparse, bones: Integers
+) -> None:
+    """Add J^T K J for a symmetric K to the entries of a symmetric sparse matrix that has them.
+
+    values, start, column  rows of the matrix, whose columns ascend
+    bones                  (m,) unknowns that move many rows of J, in which no other has an entry
+    """
+    n, count = start.size - 1, bones.size
+    number, total = np.full(n, -1), np.zeros(n)  # total: a row of K J
+    number[bones] = np.arange(count)
+    held = np.empty(J[0].size - 1, np.bool_)
+    for i in range(held.size):
+        held[i] = J[0][i] == J[0][i + 1] or number[J[1][J[0][i]]] >= 0
+    across = np.zeros((count, n))  # rows of bones
+    for i in range(held.size):
+        for e in range(K[0][i], K[0][i + 1]):
+            j, x = K[1][e], K[2][e]
+            if held[j] or not held[i]:
+                for f in range(J[0][j], J[0][j + 1]):
+                    total[J[1][f]] += x * J[2][f]
+        for f in range(J[0][i], J[0][i + 1]):
+            p, x = J[1][f], J[2][f]
+            if held[i]:
+                for b in bones:
+                    across[number[p], b] += x * total[b]
+                continue
+            for e in range(start[p], start[p + 1]):
+                values[e] += x * total[column[e]]
+            for b in range(count):
+                across[b, p] += x * total[bones[b]]
+        for f in range(J[0][i], J[0][i + 1]):
+            if not held[i]:
+                for e in range(start[J[1][f]], start[J[1][f] + 1]):
+                    total[column[e]] = 0.0
+        total[bones] = 0.0
+    for b in range(count):
+        for e in range(start[bones[b]], start[bones[b] + 1]):
+            values[e] += across[b, column[e]]
 
 
 @kernel

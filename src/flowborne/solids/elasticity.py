@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 from scipy.sparse import csr_array
 
-from flowborne.kernels.arrays import Array, Integers
+from flowborne.kernels.arrays import Array, Indices, Integers
 from flowborne.kernels.elastic import (
     Elements,
     add_stiffness,
@@ -82,7 +82,7 @@ class Elasticity:
         )
 
     @cached_property
-    def _pattern(self) -> tuple[Integers, Integers, Integers, Integers]:
+    def _pattern(self) -> tuple[Indices, Indices, Integers, Integers]:
         """Columns and row starts of the matrix, and `slot` and `stride` of `add_stiffness`."""
         count, k = len(self.rest), self.elements.shape[1]
         row, column = np.repeat(self.elements, k, axis=1), np.tile(self.elements, (1, k))
@@ -95,4 +95,9 @@ class Elasticity:
             [np.tile(columns[f : f + d].ravel(), 3) for f, d in zip(first, degree, strict=True)]
         )
         starts = np.concatenate([[0], np.cumsum(np.repeat(3 * degree, 3))])
-        return indices, starts, place[at].reshape(-1, k, k), 3 * degree
+        return (
+            indices.astype(np.int32),
+            starts.astype(np.int32),
+            place[at].reshape(-1, k, k),
+            3 * degree,
+        )

@@ -14,7 +14,7 @@ from functools import cached_property
 
 import mujoco
 import numpy as np
-from scipy.sparse import coo_array, csr_array, diags_array, eye_array, kron, vstack
+from scipy.sparse import coo_array, csr_array, diags_array, eye_array, vstack
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import spsolve
 
@@ -25,6 +25,7 @@ from flowborne.shapes.thickness import thinnest
 from flowborne.solids.elasticity import Elasticity
 from flowborne.solids.elements import measures, outer_surface, parts, prism, with_middles
 from flowborne.solids.geoms import rest_poses
+from flowborne.solids.pattern import Pattern, incidence, pattern_of
 from flowborne.solids.scratch import Compiled, Scratch, cross, posed, twists_about_origin
 from flowborne.solids.tissue.growth import Grown
 
@@ -83,7 +84,7 @@ class Flesh:
 
     def moving(self, s: Scratch) -> csr_array:
         """(3n, nv) `jacobian` at the pose in `s`."""
-        return csr_array(self._of_nodes @ self.moving_nodes(s))
+        return self._moving(s, self._vertex_entries)
 
     def nodes(self, s: Scratch) -> Array:
         """(np, 3) the nodes at the pose in `s`, m."""
@@ -92,28 +93,38 @@ class Flesh:
 
     def moving_nodes(self, s: Scratch) -> csr_array:
         """(3np, nv) from v to the velocities of the nodes at the pose in `s`."""
+        return self._moving(s, self._entries)
+
+    def _moving(self, s: Scratch, entry: csr_array) -> csr_array:
+        """Matrix of the velocities of the pairs `moved` that `entry` has the indices of."""
         twists = twists_about_origin(s.cdof, s.dof_centre())
         node, dof = self.moved
         velocity = twists[dof, :3] + cross(twists[dof, 3:], self.nodes(s)[node])
-        entry = self._entries
         data = velocity.ravel()[entry.data]
-        moving = csr_array((data, entry.indices, entry.indptr), shape=entry.shape, copy=True)
-        moving.eliminate_zeros()
-        return moving
+        return csr_array((data, entry.indices, entry.indptr), shape=entry.shape)
 
     @cached_property
-    def _of_nodes(self) -> csr_array:
-        """(3n, 3np) from the nodes' velocities to the vertices', x y z of each in turn."""
-        return csr_array(kron(self.weights, eye_array(3), format="csr"))
+    def _vertex_entries(self) -> csr_array:
+        """(3n, nv) the same as `_entries` for the vertices."""
+        return csr_array(self._entries[(3 * self.weights.indices[:, None] + np.arange(3)).ravel()])
 
     @cached_property
     def _entries(self) -> csr_array:
         """(3np, nv) the possible entries of `moving_nodes`: each is the index of its value in the
-        velocities, x y z of the pairs `moved` one after the other."""
+        velocities, x y z of the pairs `moved` one after the other. Free nodes move along axes."""
         node, dof = self.moved
-        row = (3 * node[:, None] + np.arange(3)).ravel()
+        row = 3 * node[:, None] + np.arange(3)
+        axis = self.model.mj.jnt_axis[self.model.mj.dof_jntid[dof]]
+        pair, along = np.nonzero((axis != 0.0) | ~self.dofs[dof, None])
         shape = (3 * len(self.body), self.model.mj.nv)
-        return csr_array((np.arange(row.size), (row, np.repeat(dof, 3))), shape=shape)
+        return csr_array((3 * pair + along, (row[pair, along], dof[pair])), shape=shape)
+
+    @cached_property
+    def pattern(self) -> Pattern:
+        """Places of the entries of matrices between dofs."""
+        shape = len(self.body), self.model.mj.nv
+        moves = incidence(self.elements, self.moved, shape)
+        return pattern_of(self.model.mj, moves, ~self.dofs)
 
     def of_vertices(self, velocity: Array) -> Array:
         """(nv,) velocity of the free nodes from that of the vertices (n, 3)."""
@@ -143,10 +154,15 @@ class Flesh:
         """(k,) smooth sheet at rest of each triangle of the surface."""
         return smooth_sheets(self.rest, self.surface)
 
-    @property
+    @cached_property
     def skins(self) -> list[Integers]:
         """(m, 3) triangles of each flesh, outward."""
         return [self.surface[self.of_surface == f] for f in range(len(self.names))]
+
+    @cached_property
+    def outer(self) -> list[Integers]:
+        """(k,) vertices of each skin."""
+        return [np.unique(skin) for skin in self.skins]
 
     @cached_property
     def volumes(self) -> Array:

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.sparse import csc_array, csr_array, diags_array
 
-from flowborne.kernels.arrays import Array, Indices, Integers
+from flowborne.kernels.arrays import Array, Indices
 from flowborne.solids.constraints import rows_of
 from flowborne.solids.dynamics import System, centred
 from flowborne.solids.model import SolidModel, SolidState
@@ -77,13 +77,14 @@ def assemble_flesh(
     s = scratch(model)
     s.set_time_step(dt)
     s.smooth_forces(state.q, state.v, applied)
-    M = sparse_mass(model, s)
-    A = M + _jointed(s, centred, dt)
-    K, elastic = _flesh(model, s)
     assert model.flesh is not None
-    damping = model.flesh.damping
-    half = 0.5 * dt**2 * K
-    A = A + half + 0.5 * dt * damping * K
+    pattern, damping = model.flesh.pattern, model.flesh.damping
+    M, (stiff, elastic) = sparse_mass(model, s), _flesh(model, s)
+    whole, half = _jointed(model, s, centred, dt), 0.5 * dt**2 * stiff
+    whole[pattern.of_mass] += M.data
+    whole += half
+    whole += 0.5 * dt * damping * stiff
+    A, K = pattern.filled(whole), pattern.filled(stiff)
     force = s.smooth + elastic - damping * (K @ state.v)
     v = state.v.copy()
     still = A @ v
@@ -96,55 +97,53 @@ def assemble_flesh(
     if s.data.nefc:
         s.forward(state.q, state.v, applied)
         rows, zones = rows_of(model, s)
-    full, elastic_part = csr_array(A), csr_array(half)
-    return FleshSystem(full, own, dt, v, rows, zones, centre, own, model, elastic_part)
+    return FleshSystem(A, own, dt, v, rows, zones, centre, own, model, pattern.filled(half))
 
 
 def static_forces(model: SolidModel, q: Array, applied: Array) -> tuple[csc_array, Array]:
     """Stiffness K (nv, nv), N/m or N m, and forces (nv,) at rest at q (nq,), without rows."""
     s = scratch(model)
     s.smooth_forces(q, np.zeros(model.nv), applied)
-    joints = _jointed(s, lambda _, stiff, dt: stiff / dt, s.dt)
-    K, elastic = _flesh(model, s)
-    return csc_array(joints + K), s.smooth + elastic
+    joints = _jointed(model, s, lambda _, stiff, dt: stiff / dt, s.dt)
+    stiff, elastic = _flesh(model, s)
+    assert model.flesh is not None
+    return csc_array(model.flesh.pattern.filled(joints + stiff)), s.smooth + elastic
 
 
-def _flesh(model: SolidModel, s: Scratch) -> tuple[csr_array, Array]:
-    """K (nv, nv) and the forces (nv,) of flesh at the pose in `s`."""
+def _flesh(model: SolidModel, s: Scratch) -> tuple[Array, Array]:
+    """Values of K (nv, nv) and the forces (nv,) of flesh at the pose in `s`."""
     assert model.flesh is not None
     flesh = model.flesh
     nodes, J = flesh.nodes(s), flesh.moving_nodes(s)
-    K = J.T @ (flesh.elasticity.stiffness(nodes) @ J)
-    return csr_array(K), J.T @ flesh.elasticity.forces(nodes).ravel()
+    K = flesh.pattern.congruence(flesh.elasticity.stiffness(nodes), J)
+    return K, J.T @ flesh.elasticity.forces(nodes).ravel()
 
 
 def sparse_mass(model: SolidModel, s: Scratch) -> csr_array:
     """(nv, nv) mass matrix at the pose in `s`; call it after `Scratch.smooth_forces`."""
-    mj, nv = s.mj, model.nv
-    lower = csr_array((s.data.M.copy(), mj.M_colind, _starts(mj.M_rownnz)), shape=(nv, nv))
-    return csr_array(lower + lower.T - diags_array(lower.diagonal()))
+    assert model.flesh is not None
+    entry = model.flesh.pattern.mass
+    return csr_array((s.data.M[entry.data], entry.indices, entry.indptr), shape=entry.shape)
 
 
-def _jointed(s: Scratch, part: Callable[[Array, Array, float], Array], dt: float) -> csr_array:
-    """`part` of MuJoCo's dt D + dt^2 K and dt K, of joints and tendons."""
-    data = s.data
-    active = slice(data.nefmT)
-    strength = part(data.efm_ts[active], data.efm_tk[active], dt)
-    tendons = _tendons(s, strength, data.efm_tid[active])
-    return csr_array(tendons + diags_array(part(data.efm_diag, data.efm_ck, dt)))
+def _jointed(
+    model: SolidModel, s: Scratch, part: Callable[[Array, Array, float], Array], dt: float
+) -> Array:
+    """Values of `part` of MuJoCo's dt D + dt^2 K and dt K, of joints and tendons."""
+    assert model.flesh is not None
+    data, pattern, active = s.data, model.flesh.pattern, slice(s.data.nefmT)
+    values = np.zeros(pattern.matrix.nnz)
+    if data.nefmT:
+        strength = part(data.efm_ts[active], data.efm_tk[active], dt)
+        tendons = _tendons(s, strength, data.efm_tid[active]).tocoo()
+        values[pattern.places(*tendons.coords)] = tendons.data
+    values[pattern.diagonal] += part(data.efm_diag, data.efm_ck, dt)
+    return values
 
 
 def _tendons(s: Scratch, strength: Array, active: Indices) -> csr_array:
     """Sum of strength J^T J over the active tendons."""
     mj, data = s.mj, s.data
-    if active.size == 0:
-        return csr_array((mj.nv, mj.nv))
-    J = csr_array(
-        (data.ten_J.copy(), mj.ten_J_colind, _starts(mj.ten_J_rownnz)), (mj.ntendon, mj.nv)
-    )
-    chosen = J[active]
-    return csr_array(chosen.T @ diags_array(strength) @ chosen)
-
-
-def _starts(counts: Indices) -> Integers:
-    return np.concatenate([[0], np.cumsum(counts, dtype=np.int64)])
+    start = np.concatenate([[0], np.cumsum(mj.ten_J_rownnz, dtype=np.int64)])
+    J = csr_array((data.ten_J.copy(), mj.ten_J_colind, start), (mj.ntendon, mj.nv))[active]
+    return csr_array(J.T @ diags_array(strength) @ J)

@@ -29,11 +29,10 @@ from typing import Any, Self
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
-from scipy.sparse import coo_array, csc_array, csr_array
+from scipy.sparse import csr_array
 
 from flowborne.kernels.arrays import Array, Integers, Mask
 from flowborne.solids.dynamics import Kinematics
-from flowborne.solids.flesh import Flesh
 from flowborne.solids.flesh_dynamics import FleshSystem
 from flowborne.solids.model import SolidModel
 from flowborne.solids.prescribed import Driven
@@ -49,53 +48,12 @@ def ordered(model: SolidModel, free: Integers) -> Ordering:
 
     It is computed once per model and set of free dofs.
     """
+    assert model.flesh is not None
     found = model.orderings
     key = free.tobytes()
     if key not in found:
-        found[key] = ordering_of(csc_array(pattern(model)[free][:, free]))
+        found[key] = ordering_of(model.flesh.pattern.matrix, free)
     return found[key]
-
-
-def pattern(model: SolidModel) -> csr_array:
-    """(nv, nv) ones where two dofs can couple: dofs of a chain, of a tendon, and dofs that move
-    nodes of one element."""
-    assert model.flesh is not None
-    groups = [moving(model, model.flesh), chains(model), tendons(model)]
-    return csr_array(sum(g.T @ g for g in groups) > 0).astype(np.float64)
-
-
-def moving(model: SolidModel, flesh: Flesh) -> csr_array:
-    """(elements, nv) which dofs move an element."""
-    node, dof = flesh.moved
-    moves = _ones(node, dof, (len(flesh.body), model.nv))
-    count, corners = flesh.elements.shape
-    of = np.repeat(np.arange(count), corners)
-    return _ones(of, flesh.elements.ravel(), (count, len(flesh.body))) @ moves
-
-
-def chains(model: SolidModel) -> csr_array:
-    """(nv, nv) for each dof, itself and the dofs between it and the world."""
-    parent, nv = model.mj.dof_parentid, model.nv
-    pairs = []
-    for dof in range(nv):
-        above = dof
-        while above >= 0:
-            pairs.append((dof, above))
-            above = int(parent[above])
-    behind, before = np.array(pairs, np.int64).reshape(-1, 2).T
-    return _ones(behind, before, (nv, nv))
-
-
-def tendons(model: SolidModel) -> csr_array:
-    """(tendons, nv) which dofs move a tendon."""
-    mj = model.mj
-    start = np.concatenate([[0], np.cumsum(mj.ten_J_rownnz)])
-    values = np.ones(int(start[-1]))
-    return csr_array((values, mj.ten_J_colind[: len(values)], start), (mj.ntendon, model.nv))
-
-
-def _ones(row: Integers, column: Integers, shape: tuple[int, int]) -> csr_array:
-    return coo_array((np.ones(len(row)), (row, column)), shape=shape).tocsr()
 
 
 @dataclass(frozen=True)
@@ -120,14 +78,15 @@ class PrescribedFlesh(Driven):
         return change
 
     def actuator(self, v_plus: Array, impulse: Array) -> Array:
+        if not self.prescribed.any():
+            return self.push
         left = _remaining(self.system, v_plus) + impulse
         return np.where(self.prescribed, -left / self.system.dt, self.push)
 
     def mobility(self, pose: Kinematics) -> Mobility:
         T = csr_array(pose.jacobian[:, self.free])
-        return factored_mobility(
-            T, self.factor, self._constraints(), T @ self._soft(pose.twist_rows)
-        )
+        soft = self._soft(pose.moves[:, self.free])
+        return factored_mobility(T, self.factor, self._constraints(), T @ soft)
 
     def answering(self, pose: Kinematics, drag: Drag) -> SparseAnswer:
         J, D, _ = self.system.acting()
@@ -142,12 +101,12 @@ class PrescribedFlesh(Driven):
             return Y
         return np.asarray(solve_triangular(np.tril(small[0]), Y.T, lower=True).T)
 
-    def _soft(self, jacobian: Array) -> Array:
+    def _soft(self, moves: Mask) -> Array:
         """(nf, m) Z with Z Z^T the part of B_FF^-1 that moves bones, with flesh responding freely.
 
-        jacobian  (6 nbody, nv) from v to the twists of the bones
+        moves  (nbody, nf) which dofs move bones
         """
-        bones = np.flatnonzero(np.abs(jacobian[:, self.free]).max(axis=0, initial=0.0) > 0.0)
+        bones = np.flatnonzero(moves.any(axis=0))
         unit = np.zeros((len(self.free), len(bones)))
         unit[bones, np.arange(len(bones))] = 1.0
         answers = _solve(self.factor, self.rows, unit) if len(bones) else unit
@@ -183,7 +142,7 @@ def prescribe_flesh(system: FleshSystem, prescribed: Mask, hold: Array) -> Presc
 
 def factored(system: FleshSystem, free: Integers) -> Cholesky:
     """The factor of A_FF for the free dofs (nf,)."""
-    return cholesky(system.A, free, ordered(system.model, free))
+    return cholesky(system.A.data, ordered(system.model, free))
 
 
 def _damped(system: FleshSystem, free: Integers, factor: Cholesky) -> FleshSystem:

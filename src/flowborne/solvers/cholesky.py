@@ -7,12 +7,13 @@ minimum degree; a factor after that costs its arithmetic alone.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy.sparse import csc_array, csr_array, diags_array
 from scipy.sparse.linalg import SuperLU, splu
 
-from flowborne.kernels.arrays import Array, Blocks, Integers
+from flowborne.kernels.arrays import Array, Blocks, Indices, Integers
 from flowborne.kernels.cholesky import factorise, solve_factored
 
 WIDEST = 32
@@ -25,10 +26,14 @@ class Ordering:
 
     place   (n,) number of each unknown in L
     blocks  of L, see `kernels.arrays.Blocks`
+    within  see `kernels.cholesky.give_update`
+    slot    where in the values of L each of the matrix belongs, -1 for none
     """
 
     place: Integers
     blocks: Blocks
+    within: Indices
+    slot: Integers
 
 
 @dataclass(frozen=True)
@@ -47,11 +52,11 @@ class Cholesky:
         return np.ascontiguousarray(turned[:, place].T).reshape(right.shape)
 
 
-def ordering_of(pattern: csc_array) -> Ordering:
-    """Of symmetric matrices (n, n) whose entries are among those of `pattern`; its values do not
-    matter."""
-    n = pattern.shape[0]
-    likely = csc_array(pattern, copy=True)
+def ordering_of(matrix: csr_array, free: Integers) -> Ordering:
+    """Of the rows and columns `free` (n,) of symmetric matrices that have their entries where this
+    one has them; its values do not matter."""
+    n = len(free)
+    likely = csc_array(matrix[free][:, free])
     likely.data[:] = -1.0
     likely = csc_array(likely + diags_array(2.0 + np.diff(likely.indptr)))  # nothing cancels in L
     factor = symmetric_factor(likely)
@@ -76,7 +81,31 @@ def ordering_of(pattern: csc_array) -> Ordering:
         _from_zero(width * (width + height)),
         np.repeat(np.arange(len(first)), width).astype(np.int32),
     )
-    return Ordering(place, blocks)
+    row = np.repeat(np.arange(matrix.shape[0]), np.diff(matrix.indptr))
+    number = np.full(matrix.shape[0], -1)
+    number[free] = place
+    return Ordering(place, blocks, *_inside(blocks, number[matrix.indices], number[row]))
+
+
+def _inside(blocks: Blocks, r: Integers, c: Integers) -> tuple[Indices, Integers]:
+    """`Ordering.within`, and `slot` of entries in these rows and columns of L, -1 if left out."""
+    first, below, rows, at, owner = blocks
+    n, width, height = owner.size, np.diff(first), np.diff(below)
+    known = np.repeat(np.arange(len(width)), height) * n + rows
+    slot, lower = np.full(len(r), -1), np.flatnonzero((c >= 0) & (r >= c))
+    r, c = r[lower], c[lower]
+    s = owner[c].astype(np.int64)
+    number = np.searchsorted(known, s * n + r) - below[s]
+    beneath = width[s] ** 2 + (c - first[s]) * height[s] + number
+    triangle = (c - first[s]) * width[s] + r - first[s]
+    slot[lower] = at[s] + np.where(r < first[s + 1], triangle, beneath)
+    within = [np.zeros(0, np.int64)]
+    for low, high in pairwise(below):
+        for target in np.unique(owner[rows[low:high]]).astype(np.int64):
+            beyond = low + np.searchsorted(rows[low:high], first[target + 1])
+            found = np.searchsorted(known, target * n + rows[beyond:high])
+            within.append(found - below[target])
+    return np.concatenate(within).astype(np.int32), slot
 
 
 def _from_zero(sizes: Integers) -> Integers:
@@ -84,20 +113,13 @@ def _from_zero(sizes: Integers) -> Integers:
     return np.concatenate([[0], np.cumsum(sizes, dtype=np.int64)])
 
 
-def cholesky(matrix: csr_array, free: Integers, ordering: Ordering) -> Cholesky:
-    """Factor of the rows and columns `free` (n,) of a symmetric matrix.
+def cholesky(entry: Array, ordering: Ordering) -> Cholesky:
+    """Factor of the matrix of these entries.
 
-    ordering  of matrices with their entries there
-    raises  ArithmeticError when it is not positive definite; ValueError when it has other entries
+    raises  ArithmeticError when it is not positive definite
     """
     value = np.empty(int(ordering.blocks[3][-1]))
-    place = np.full(matrix.shape[0], -1)
-    place[free] = ordering.place
-    start, row = matrix.indptr.astype(np.int32), matrix.indices.astype(np.int32)
-    fault = factorise(value, ordering.blocks, place, start, row, matrix.data)
-    if fault == 1:
-        raise ValueError("the matrix has entries that its ordering has no place for")
-    if fault == 2:
+    if not factorise(value, ordering.blocks, ordering.within, ordering.slot, entry):
         raise ArithmeticError("the matrix is not positive definite")
     return Cholesky(ordering, value)
 
