@@ -28,7 +28,7 @@ from flowborne.fluid.ghosts import edge, impose_sides
 from flowborne.fluid.grid import copied, faces_of
 from flowborne.fluid.projection import accelerated
 from flowborne.fluid.transport import Transport, carry_component, damp_eddies
-from flowborne.kernels.arrays import PRESCRIBED, Array, Faces
+from flowborne.kernels.arrays import Array, Faces
 from flowborne.kernels.control_volumes import stride
 from flowborne.kernels.faces import changes_of_step, still_to_come
 from flowborne.solids.dynamics import Kinematics
@@ -41,7 +41,8 @@ class AdvectionResult:
     velocity  Faces u*, m/s
     volumes   control volumes at the end of the step
     crossed   (3,) momentum that the flow carried in through the sides, N s
-    stopped   (3,) momentum that sides with a prescribed velocity gave to the flow, N s
+    stopped   (3,) momentum that sides with a prescribed velocity gave to the flow, N s; not what
+              they did at the end without balances
     expelled  (3,) momentum that came in through mouths and sources, N s
     jets      of the mouths; those that take fluid in have the velocity of that fluid
     """
@@ -70,7 +71,8 @@ def advect(
 ) -> tuple[AdvectionResult, Dyed]:
     """Velocity and scalars a step later; `velocity` (Faces, m/s) is that at the start."""
     fluid, state = world.flow()
-    carried, dyed = advect_momentum(start, velocity, transport), Dyed({}, 0.0)
+    carried = advect_momentum(start, velocity, transport, world.setup.balances)
+    dyed = Dyed({}, 0.0)
     if state.scalars:
         inflow = brought_by(start.jets, start.rate, tuple(state.scalars))
         backwards = world.steps % 2 == 1
@@ -79,7 +81,9 @@ def advect(
     return carried, dyed
 
 
-def advect_momentum(start: Departure, velocity: Faces, transport: Transport) -> AdvectionResult:
+def advect_momentum(
+    start: Departure, velocity: Faces, transport: Transport, balances: bool
+) -> AdvectionResult:
     """Every component on its moving control volumes; nothing is lost (see `fluid.transport`).
 
     velocity   Faces at the start, with half of the last pressure, m/s
@@ -107,15 +111,14 @@ def advect_momentum(start: Departure, velocity: Faces, transport: Transport) -> 
             taken[axis] = taken_by(jet, axis, inlets, carried.drained, grid, sides)
     if fluid.viscosity == 0.0:
         damp_eddies(faces_of(arrived), transport, grid, sides)
-    for place, side in sides.around(grid):
-        u = arrived[place.axis]
-        before = u[place.layer].copy()
-        side.impose(u, place, transport.time + dt)
-        if side.normal == PRESCRIBED:
-            mass = fluid.density * transport.after.moving[place.axis][place.layer]
-            stopped[place.axis] += float((mass * (u[place.layer] - before)).sum())
+    time, reached = transport.time + dt, faces_of(arrived)
+    for place, across in sides.across(grid, time) if balances else ():
+        mass = fluid.density * transport.after.moving[place.axis][place.layer]
+        change = across - reached[place.axis][place.layer]
+        stopped[place.axis] += float((mass * change).sum())
+    impose_sides(reached, grid, sides, time)
     return AdvectionResult(
-        faces_of(arrived),
+        reached,
         transport.after,
         crossed,
         stopped,
@@ -134,6 +137,10 @@ def apply_body_force_and_sides(
     time  s at the end of the step
     """
     grid = fluid.grid
+    sources = [(s, s.velocity) for s in fluid.sources if s.active(time)]
+    driven = [(cells_in(s, grid), u) for s, u in sources if u is not None]
+    if not driven and not any(fluid.body_force):
+        return advected.velocity
     velocity = copied(advected.velocity, grid)
     if any(fluid.body_force):
         mass = face_masses(advected.volumes, fluid.density)
@@ -142,11 +149,10 @@ def apply_body_force_and_sides(
             given = dt * fluid.density * fluid.body_force[axis] * grid.spacing
             velocity[axis][:] += given * rates[axis]
     for axis in grid.axes:
-        for source in fluid.sources:
-            if source.velocity is not None and source.active(time):
-                box = list(cells_in(source, grid))
-                box[axis] = slice(box[axis].start, box[axis].stop + 1)
-                velocity[axis][tuple(box)] = source.velocity[axis]
+        for cells, driven_velocity in driven:
+            box = list(cells)
+            box[axis] = slice(box[axis].start, box[axis].stop + 1)
+            velocity[axis][tuple(box)] = driven_velocity[axis]
     impose_sides(velocity, grid, fluid.boundaries, time)
     return velocity
 

@@ -96,7 +96,7 @@ class SolvedFlow(Solved):
     velocity         Faces u+, m/s
     pressure         (nx, ny, nz) p, Pa
     impulse          (k,) J^T p^
-    sides            (3,) impulse of the sides on the fluid, N s
+    sides            (3,) impulse of the sides on the fluid, N s; nan without balances
     iterations       of the pressure solve, all turns of a step together
     residual         true relative residual
     divergence       largest |net outflow of a cell| / volume, 1/s; nan without balances
@@ -222,11 +222,13 @@ def solve_together(
     change = boundary_velocity(pose, v - driven.system.v)
     plain = partial(pressure_system, gradient, cut.open)
     added_mass: Array | Callable[[], Array] = np.full(change.size, np.nan)
+    pushed = np.full(3, np.nan)
     divergence = fastest = np.nan
     if world.setup.balances:
         moved = start + term.mobility.times(on_solids)
         divergence = largest_divergence(after, cut, moved, rate, fluid)
         fastest = max(largest_open(after[axis], cut.open[axis], 0.0) for axis in fluid.grid.axes)
+        pushed = side_push(solution.pressure, cut.open, gradient)
         added_mass = partial(added_mass_impulse, plain, cut, change)
     if world.setup.splits:
         own = (lambda: matrix) if mobility.is_dense else plain
@@ -244,7 +246,7 @@ def solve_together(
         velocity=after,
         pressure=solution.pressure / dt,
         impulse=on_solids,
-        sides=side_push(solution.pressure, cut.open, gradient),
+        sides=pushed,
         iterations=iterations,
         residual=solution.residual,
         divergence=divergence,

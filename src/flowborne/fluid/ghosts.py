@@ -40,8 +40,16 @@ def planes(faces: Faces, grid: Grid) -> Faces:
 
 def impose_sides(velocity: Faces, grid: Grid, boundaries: Boundaries, time: float) -> None:
     """Set the normal velocity on the sides that prescribe it, and join periodic ends."""
-    for place, side in boundaries.around(grid):
-        side.impose(velocity[place.axis], place, time)
+    for place, across in boundaries.across(grid, time):
+        velocity[place.axis][place.layer] = across
+    join_ends(velocity, grid, boundaries)
+
+
+def join_ends(field: Faces, grid: Grid, boundaries: Boundaries) -> None:
+    """Give the last faces of each periodic axis what the first ones have."""
+    for axis in grid.axes:
+        if boundaries.periodic()[axis]:
+            field[axis][edge(axis, -1)] = field[axis][edge(axis, 0)]
 
 
 def packed_sides(

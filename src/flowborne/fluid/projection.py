@@ -35,8 +35,8 @@ def accelerated(opened: Faces, mass: Faces, grid: Grid, boundaries: Boundaries) 
     rates = grid.empty_faces()
     for axis in grid.axes:
         accelerate(rates[axis], opened[axis], mass[axis], grid.face_area)
-    for place, side in boundaries.around(grid):
-        rates[place.axis][place.layer] *= side.pressure_weight(place)
+    for place, weight in boundaries.pressure_weights(grid):
+        rates[place.axis][place.layer] *= weight
     return rates
 
 

@@ -33,7 +33,7 @@ import numpy as np
 
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.control_volumes import NONE, NOTHING, ControlVolumes
-from flowborne.fluid.ghosts import edge, packed_sides, plane, planes
+from flowborne.fluid.ghosts import join_ends, packed_sides, plane, planes
 from flowborne.fluid.grid import Grid
 from flowborne.kernels.arrays import Array, Faces, Integers, Marks, Three
 from flowborne.kernels.carry import Exchange, Inlets, Scratch, Volumes, carry
@@ -221,6 +221,4 @@ def damp_eddies(velocity: Faces, transport: Transport, grid: Grid, sides: Bounda
         found.append((*flow, held, *exchanges_near(flow, held, listed, axis, wraps, GHOSTS, rate)))
     for each in found:
         exchange(*each)
-    for axis in grid.axes:
-        if sides.periodic()[axis]:
-            velocity[axis][edge(axis, -1)] = velocity[axis][edge(axis, 0)]
+    join_ends(velocity, grid, sides)
