@@ -18,7 +18,7 @@ from flowborne.coupling.mouths import (
     inlets_across,
     taken_by,
 )
-from flowborne.coupling.operators import boundary_velocity, carried_at
+from flowborne.coupling.operators import boundary_velocity, motion_of
 from flowborne.coupling.solve import SolvedFlow
 from flowborne.coupling.world import Fluid, World
 from flowborne.fluid.boundary import cells_in
@@ -30,6 +30,7 @@ from flowborne.fluid.projection import accelerated
 from flowborne.fluid.transport import Transport, carry_component, damp_eddies
 from flowborne.kernels.arrays import Array, Faces
 from flowborne.kernels.control_volumes import stride
+from flowborne.kernels.coupling_rows import fill_empty_faces
 from flowborne.kernels.faces import changes_of_step, still_to_come
 from flowborne.solids.dynamics import Kinematics
 
@@ -206,12 +207,12 @@ def fill_with_leak_proof(
 
     moving  (k,) see `operators.leak_proof`
     """
-    grid, sides = fluid.grid, fluid.boundaries
+    grid, sides, motion = fluid.grid, fluid.boundaries, motion_of(cut, moving)
     for axis in grid.axes:
         faces = np.concatenate([volumes.cut[axis], volumes.closed[axis].faces])
         if sides.periodic()[axis]:  # the last ones are the first ones
             shape = grid.face_shape(axis)
             first = faces[np.unravel_index(faces, shape)[axis] == 0]
             faces = np.append(faces, first + grid.shape[axis] * stride(shape, axis))
-        empty = faces[volumes.moving[axis].reshape(-1)[faces] == 0.0]
-        velocity[axis].reshape(-1)[empty] = carried_at(empty, axis, velocity, cut, moving)
+        held, opened = volumes.moving[axis], cut.open[axis]
+        fill_empty_faces(faces, velocity[axis], axis, held, opened, cut.closed, motion)

@@ -21,6 +21,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
+from math import prod, sqrt
 
 import numpy as np
 
@@ -31,8 +32,8 @@ from flowborne.coupling.operators import (
     add_flux,
     beyond_sides,
     boundary_velocity,
-    carried_at,
     generalised,
+    motion_of,
     pressure_push,
     side_push,
 )
@@ -43,6 +44,7 @@ from flowborne.fluid.control_volumes import ControlVolumes, face_masses
 from flowborne.fluid.grid import Grid, copied
 from flowborne.fluid.projection import PressureGradient, face_weights
 from flowborne.kernels.arrays import ROUNDING, Array, Faces, Integers
+from flowborne.kernels.coupling_rows import fastest_closed
 from flowborne.kernels.faces import largest_open, largest_size
 from flowborne.kernels.projection import open_outflow
 from flowborne.solids.driven import Driven, within_limits
@@ -351,9 +353,9 @@ def rounding_floor(velocity: Faces, cut: Geometry, moving: Array, grid: Grid) ->
 
     Of fluid and bodies in motion (k,): a body that turns displaces less than its faces move.
     """
-    fastest = 0.0
+    motion, fastest = motion_of(cut, moving), 0.0
     for axis in grid.axes:
-        faces = cut.closed.face[cut.closed.axis == axis]
-        met = np.abs(carried_at(faces, axis, velocity, cut, moving)).max(initial=0.0)
-        fastest = max(fastest, met, largest_open(velocity[axis], cut.open[axis], 1.0 - ROUNDING))
-    return float(ROUNDING * grid.face_area * fastest * np.sqrt(np.prod(grid.shape)))
+        u, opened = velocity[axis], cut.open[axis]
+        met = fastest_closed(u, axis, opened, cut.closed, motion)
+        fastest = max(fastest, met, largest_open(u, opened, 1.0 - ROUNDING))
+    return ROUNDING * grid.face_area * fastest * sqrt(prod(grid.shape))
