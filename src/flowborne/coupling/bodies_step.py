@@ -113,8 +113,10 @@ def parts_of(world: World, velocity: Array, dt: float) -> int:
 def part_of(command: JointCommand, world: World, left: int) -> JointCommand:
     """What the joints do in the next of `left` parts of what is left of a step: the same, but
     drives that may give way change their velocity evenly."""
-    part, v = command.copy(), world.solid.v
     limited = np.isfinite(command.torque_limit)
+    if not limited.any():
+        return command
+    part, v = command.copy(), world.solid.v
     evenly = v + (command.final_velocity - v) / left
     part.final_velocity[limited] = evenly[limited]
     return part

@@ -17,9 +17,9 @@ from flowborne.fluid.grid import Grid, faces_of
 from flowborne.fluid.projection import PressureGradient
 from flowborne.kernels.arrays import FREE, Array, DenseTerm, Faces
 from flowborne.kernels.coupling_rows import Motion, add_body_velocity
+from flowborne.kernels.momentum import about_origin
 from flowborne.kernels.sparse_rows import add_rows, sum_rows
 from flowborne.solids.dynamics import Kinematics
-from flowborne.solids.scratch import cross
 from flowborne.solvers.pressure import NO_DENSE_TERM
 
 
@@ -84,7 +84,7 @@ def pressure_push(geometry: Geometry, pressure: Array, size: int) -> Array:
 def buoyancy_wrench(centroid: Array, volume: Array, gravity: Array, density: float) -> Array:
     """(nbody, 6) Archimedes' force -rho g V at the centroid of each body's displaced volume."""
     force = -density * volume[:, None] * gravity[None, :]
-    return np.concatenate([force, cross(centroid, force)], axis=1)
+    return about_origin(force, np.zeros(force.shape), centroid)
 
 
 def beyond_sides(dipoles: Dipoles | None, strength: float) -> DenseTerm:

@@ -35,7 +35,7 @@ from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.control_volumes import NONE, NOTHING, ControlVolumes
 from flowborne.fluid.ghosts import join_ends, packed_sides, plane, planes
 from flowborne.fluid.grid import Grid
-from flowborne.kernels.arrays import Array, Faces, Integers, Marks, Three
+from flowborne.kernels.arrays import Array, FaceGrid, Faces, Integers, Marks, Three
 from flowborne.kernels.carry import Exchange, Inlets, Scratch, Volumes, carry
 from flowborne.kernels.control_volumes import Transfers, merged
 from flowborne.kernels.eddies import exchange, exchanges_near
@@ -154,30 +154,45 @@ def carry_component(
               nothing
     """
     count, faces = transport.substeps(grid), sides.faces(component, grid)
-    before, after, dt = transport.before, transport.after, transport.dt / count
+    dt = transport.dt / count
     times = [transport.time + n * dt for n in range(count + 1)]
     table = packed_sides(component, grid, sides, times, transport.flux)
     ring = sides.periodic()[component]
     means = neighbours(int(faces.shape[faces.component]), ring)
     flux = Fluxes(planes(transport.flux, grid), faces.component, *means)
-    given = passed_on(before.transfers[component], after.transfers[component], transport.dt)
+    volumes, given = volumes_between(transport, faces, component, grid)
     exchange, out = Exchange(flux, table, inlets, given), np.empty(velocity.shape)
-    volumes = Volumes(
-        plane(before.cells, grid),
-        plane(before.moving[component], grid),
-        plane(after.moving[component], grid),
-        merged(before.cut[component], after.cut[component])[0],
-        before.closed[component],
-        after.closed[component],
-        faces,
-        NOTHING * grid.cell_volume,
-    )
     rising = 0.0 if along is None else transport.extrapolated(grid)
     more = plane(velocity if along is None else along, grid)
     fields = plane(out, grid), plane(velocity, grid), more
     with borrowed(grid, faces.shape) as scratch:
         crossed, held, drained = carry(*fields, rising, volumes, exchange, scratch, dt)
     return Carried(out, crossed, held, drained)
+
+
+def volumes_between(
+    transport: Transport, faces: FaceGrid, component: int, grid: Grid
+) -> tuple[Volumes, Transfers]:
+    """The control volumes of a component in a step, and what they pass on; those that stay keep
+    both."""
+    before, after, dt = transport.before, transport.after, transport.dt
+    known = before.staying.get(component) if before is after else None
+    if known is None or known[0] != dt:
+        volumes = Volumes(
+            plane(before.cells, grid),
+            plane(before.moving[component], grid),
+            plane(after.moving[component], grid),
+            merged(before.cut[component], after.cut[component])[0],
+            before.closed[component],
+            after.closed[component],
+            faces,
+            NOTHING * grid.cell_volume,
+        )
+        given = passed_on(before.transfers[component], after.transfers[component], dt)
+        known = dt, volumes, given
+        if before is after:
+            before.staying[component] = known
+    return known[1:]
 
 
 _spare: dict[tuple[int, int, int], list[tuple[Array, Marks]]] = {}

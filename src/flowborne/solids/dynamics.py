@@ -142,6 +142,8 @@ class System(ABC):
         if self.halfway is None:
             return self.own, True
         own, rounding = self.halfway.impulse(v_plus)
+        if own is self.own:
+            return own, True
         change = np.abs(own - self.own)
         n = np.flatnonzero(~(change <= rounding))
         scale = abs(self.A[n]) @ (np.abs(v_plus) + REST_SPEED)

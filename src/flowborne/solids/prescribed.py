@@ -20,7 +20,14 @@ from scipy.linalg.lapack import dpotrf, dpotri
 from flowborne.base.errors import BreakdownError
 from flowborne.kernels.arrays import Array, Mask
 from flowborne.solids.dynamics import Kinematics, SolidSystem, System
-from flowborne.solvers.mobility import Answering, DenseAnswer, Drag, Mobility, dense_mobility
+from flowborne.solvers.mobility import (
+    Answering,
+    DenseAnswer,
+    Drag,
+    Mobility,
+    dense_mobility,
+    no_mobility,
+)
 
 
 @dataclass(frozen=True)
@@ -108,6 +115,8 @@ class PrescribedSystem(Driven):
         return np.where(self.prescribed, needed, self.push)
 
     def mobility(self, pose: Kinematics) -> Mobility:
+        if not self.inverse.any():
+            return no_mobility(len(pose.twist_rows))
         return dense_mobility(self._response(pose))
 
     def answering(self, pose: Kinematics, drag: Drag) -> DenseAnswer:
