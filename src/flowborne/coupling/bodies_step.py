@@ -15,7 +15,7 @@ from flowborne.coupling.drives import joint_command
 from flowborne.coupling.operators import generalised, twists
 from flowborne.coupling.report import StepReport, timed
 from flowborne.coupling.solve import solve_bodies
-from flowborne.coupling.step_report import report_bodies
+from flowborne.coupling.step_report import fluid_forces, report_bodies
 from flowborne.coupling.stream import winds_on
 from flowborne.coupling.world import World
 from flowborne.fluid.transport import parts_for
@@ -61,12 +61,12 @@ def step_bodies(world: World, dt: float, command: JointCommand) -> StepReport:
     """A step without a fluid, in place: simple winds, gravity, joints and contact."""
     model, before, force = world.setup.solid, world.solid.copy(), np.zeros(world.setup.solid.nv)
     move_bodies(world, command, dt)
-    known: dict[str, Array] = {}
+    known = fluid_forces(model, 0.0)
     if world.setup.winds:
         pose = kinematics(model, world.solid.q)
         wind = winds_on(world, pose)
         force = generalised(pose, np.append(wind, np.zeros(pose.vertices.size)))
-        known = {"centre": pose.mass_centre, "wind_wrench": wind}
+        known |= {"centre": pose.mass_centre, "wind_wrench": wind}
     driven = equations(world, before, force, command, dt)
     solved = solve_bodies(driven, command.torque_limit)
     world.solid.v[:] = solved.v

@@ -106,8 +106,9 @@ def advect_momentum(
         arrived.insert(axis, carried.velocity)
         crossed[axis] = fluid.density * carried.crossed
         stopped[axis] = fluid.density * carried.held
-        brought = dt * float(inlets.gain @ inlets.velocity)
-        gained[axis] = fluid.density * (brought - float(carried.drained.sum()))
+        if cells.size:
+            brought = dt * float(inlets.gain @ inlets.velocity)
+            gained[axis] = fluid.density * (brought - float(carried.drained.sum()))
         for jet, taken in zip(jets, drunk, strict=True):
             taken[axis] = taken_by(jet, axis, inlets, carried.drained, grid, sides)
     if fluid.viscosity == 0.0:

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from enum import Enum
-from functools import partial
+from functools import partial, wraps
 from operator import itemgetter
 from time import perf_counter
-from typing import Annotated, Any, NamedTuple, get_type_hints
+from typing import Annotated, Any, NamedTuple, ParamSpec, TypeVar, get_type_hints
 from weakref import ref
 
 import numpy as np
@@ -23,6 +22,9 @@ from flowborne.solids.sensed import Sensed
 
 BREAKDOWNS = ArithmeticError, np.linalg.LinAlgError, BreakdownError, PartError, WorkerError
 """Errors with which a step may end; their text says what happened."""
+
+P = ParamSpec("P")
+R = TypeVar("R")
 
 Rule = Callable[[Sequence[Any]], Any]
 """Makes one value of several ones in the order of time."""
@@ -246,21 +248,38 @@ FIELDS: dict[str, Joined] = {
 _timing: ContextVar[tuple[dict[str, float], str] | None] = ContextVar("timing", default=None)
 
 
-@contextmanager
-def timed(part: str) -> Iterator[dict[str, float]]:
+class Timer:
     """Seconds by part of a step, complete at the end of the block.
 
     Those of the block, or of the calls of a function that this decorates, count for `part`; those
     of a timed block or function inside it for its own part alone.
     """
-    around = _timing.get()
-    seconds = defaultdict[str, float](float) if around is None else around[0]
-    token, started = _timing.set((seconds, part)), perf_counter()
-    try:
-        yield seconds
-    finally:
-        _timing.reset(token)
-        spent = perf_counter() - started
-        seconds[part] += spent
-        if around is not None:
-            seconds[around[1]] -= spent
+
+    def __init__(self, part: str) -> None:
+        self._part = part
+
+    def __call__(self, function: Callable[P, R]) -> Callable[P, R]:
+        @wraps(function)
+        def counted(*args: P.args, **kwargs: P.kwargs) -> R:
+            with Timer(self._part):
+                return function(*args, **kwargs)
+
+        return counted
+
+    def __enter__(self) -> dict[str, float]:
+        self._around = around = _timing.get()
+        self._seconds = defaultdict[str, float](float) if around is None else around[0]
+        self._token = _timing.set((self._seconds, self._part))
+        self._started = perf_counter()
+        return self._seconds
+
+    def __exit__(self, *_: object) -> None:
+        _timing.reset(self._token)
+        spent = perf_counter() - self._started
+        self._seconds[self._part] += spent
+        if self._around is not None:
+            self._seconds[self._around[1]] -= spent
+
+
+timed = Timer
+"""As one says it, around a block or a function."""

@@ -40,7 +40,7 @@ from flowborne.coupling.operators import (
 from flowborne.coupling.report import Outcome, timed
 from flowborne.coupling.viscous_solve import diffuse
 from flowborne.coupling.world import Fluid, World
-from flowborne.fluid.control_volumes import ControlVolumes, face_masses
+from flowborne.fluid.control_volumes import ControlVolumes
 from flowborne.fluid.grid import Grid, copied
 from flowborne.fluid.projection import PressureGradient, face_weights
 from flowborne.kernels.arrays import ROUNDING, Array, Faces, Integers
@@ -90,7 +90,6 @@ class SolvedFlow(Solved):
     """The same with the fluid's. Impulses (k,) on bodies are wrenches about the world origin, then
     forces on vertices of flesh, N s and N m s.
 
-    mass             Faces, of the fluid that pressure on each face accelerates, kg
     viscous_impulse  (k,)
     added_mass       (k,) the part of `impulse` of `added_mass_impulse`, or what gives it; nan in
                      trials
@@ -105,7 +104,6 @@ class SolvedFlow(Solved):
     fastest          largest |u+| on an open face, m/s; likewise
     """
 
-    mass: Faces
     viscous_impulse: Array
     added_mass: Array | Callable[[], Array]
     before_pressure: Faces
@@ -177,7 +175,7 @@ def solve_together(
     """
     dt = driven.system.dt
     fluid, state = world.flow()
-    mass, mobility = face_masses(volumes, fluid.density), driven.mobility(pose)
+    mobility = driven.mobility(pose)
     gradient, matrix = pressure_on(world, volumes, cut, mobility)
     pressure = dt * state.pressure
     tolerance = fluid.tolerance
@@ -185,7 +183,8 @@ def solve_together(
         tolerance = max(tolerance, TIGHTENING)
     rate = source_rate(fluid, world.time + dt, cut.open)
     add_rates(rate, jets)
-    smooth, viscous, smoothed = diffuse(world, velocity, mass, gradient, cut, jets, pose, driven)
+    given = world, velocity, volumes, gradient, cut, jets, pose
+    smooth, viscous, smoothed = diffuse(*given, driven)
     term = LowRankTerm(cut.rows, mobility)
     net = net_outflow(smooth, cut, rate, fluid)
     floor = rounding_floor(smooth, cut, boundary_velocity(pose, driven.velocity), fluid.grid)
@@ -206,9 +205,7 @@ def solve_together(
         if changed is not None:
             if not changed.same_mobility(driven):
                 term = replace(term, mobility=changed.mobility(pose))
-                smooth, viscous, smoothed = diffuse(
-                    world, velocity, mass, gradient, cut, jets, pose, changed
-                )
+                smooth, viscous, smoothed = diffuse(*given, changed)
                 net = net_outflow(smooth, cut, rate, fluid)
             tried, driven = driven, changed
         tolerance = max(fluid.tolerance, TIGHTENING * tolerance)
@@ -221,11 +218,12 @@ def solve_together(
         outcome = Outcome.VISCOSITY_NOT_CONVERGED
     if not solution.converged:
         outcome = Outcome.PRESSURE_NOT_CONVERGED
-    change = boundary_velocity(pose, v - driven.system.v)
     plain = partial(pressure_system, gradient, cut.open)
-    added_mass: Array | Callable[[], Array] = np.full(change.size, np.nan)
+    added_mass: Array | Callable[[], Array] = np.full(start.size, np.nan)
     pushed = np.full(3, np.nan)
     divergence = fastest = np.nan
+    if world.setup.balances or world.setup.splits:
+        change = boundary_velocity(pose, v - driven.system.v)
     if world.setup.balances:
         moved = start + term.mobility.times(on_solids)
         divergence = largest_divergence(after, cut, moved, rate, fluid)
@@ -241,7 +239,6 @@ def solve_together(
         actuator,
         outcome,
         left,
-        mass=mass,
         viscous_impulse=viscous,
         added_mass=added_mass,
         before_pressure=smooth,

@@ -16,7 +16,7 @@ from flowborne.coupling.report import FIELDS, Asked, Outcome, StepReport
 from flowborne.coupling.solve import Solved, SolvedFlow
 from flowborne.coupling.stream import winds_on
 from flowborne.coupling.world import World
-from flowborne.fluid.control_volumes import momentum_changes
+from flowborne.fluid.control_volumes import face_masses, momentum_changes
 from flowborne.kernels.arrays import Array
 from flowborne.solids.dynamics import Kinematics
 from flowborne.solids.flesh import Flesh
@@ -48,7 +48,7 @@ def report_failed(model: SolidModel, dt: float, outcome: Outcome) -> StepReport:
 def report_bodies(world: World, dt: float, solved: Solved, known: dict[str, Any]) -> StepReport:
     """Of a step without a fluid.
 
-    known  what the report says of winds; of all of the fluid, if there is one
+    known  what the report says of the forces of winds and of the fluid
     """
     before, model = solved.driven.system.v, world.setup.solid
     velocity = 0.5 * (before + solved.v)
@@ -66,7 +66,7 @@ def report_bodies(world: World, dt: float, solved: Solved, known: dict[str, Any]
         contacts=solved.driven.system.contacts,
         limited=solved.driven.limited.nonzero()[0],
         unsettled=solved.unsettled,
-        **fluid_forces(model, 0.0) | balance | known,
+        **balance | known,
     )
 
 
@@ -143,7 +143,7 @@ def momentum_budget(
     world: World, half: HalfPressure, advected: AdvectionResult, solved: SolvedFlow
 ) -> dict[str, Any]:
     """What the report says of the fluid's momentum."""
-    (fluid, _), mass = world.flow(), solved.mass
+    fluid, mass = world.flow()[0], face_masses(advected.volumes, world.flow()[0].density)
     before, grid, boundaries = solved.before_pressure, fluid.grid, fluid.boundaries
     first = 6 * world.setup.solid.nbody
     fields = advected.velocity, before, solved.velocity

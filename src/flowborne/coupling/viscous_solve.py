@@ -32,6 +32,7 @@ from flowborne.coupling.operators import boundary_velocity, generalised, pressur
 from flowborne.coupling.report import timed
 from flowborne.coupling.world import World
 from flowborne.fluid.boundary import Boundaries
+from flowborne.fluid.control_volumes import ControlVolumes, face_masses
 from flowborne.fluid.ghosts import edge
 from flowborne.fluid.grid import Grid, faces_of
 from flowborne.fluid.projection import PressureGradient
@@ -308,7 +309,7 @@ class ViscousSystem:
 def diffuse(
     world: World,
     velocity: Faces,
-    mass: Faces,
+    volumes: ControlVolumes,
     gradient: PressureGradient,
     cut: Geometry,
     jets: tuple[Jet, ...],
@@ -338,7 +339,7 @@ def diffuse(
     parts = assemble_viscosity(
         OpenParts(cut.distance, cut.crossings, cut.open, cut.volume),
         velocity,
-        mass,
+        face_masses(volumes, fluid.density),
         grid,
         sides,
         fluid.viscosity,

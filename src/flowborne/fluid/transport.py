@@ -195,7 +195,7 @@ def volumes_between(
     return known[1:]
 
 
-_spare: dict[tuple[int, int, int], list[tuple[Array, Marks]]] = {}
+_spare: dict[Three, list[tuple[Array, Marks, dict[Three, Scratch]]]] = {}
 
 
 @contextmanager
@@ -204,14 +204,17 @@ def borrowed(grid: Grid, shape: Three) -> Iterator[Scratch]:
     kept for the next one."""
     store, deep = _spare.setdefault(grid.shape, []), 2 * GHOSTS
     try:
-        memory, bits = store.pop()
+        memory, bits, made = store.pop()
     except IndexError:
         most = prod(n + 1 + deep if axis in grid.axes else n for axis, n in enumerate(grid.shape))
-        memory, bits = np.zeros((7, most)), np.zeros(most, np.uint8)
-    wide = [n + deep * (axis > 0 or not grid.is_slab) for axis, n in enumerate(shape)]
-    padded = Padded(memory[0, : prod(wide)].reshape(wide), bits[: prod(wide)].reshape(wide))
-    yield Scratch(padded, *(flat[: prod(shape)].reshape(shape) for flat in memory[1:]))
-    store.append((memory, bits))
+        memory, bits, made = np.zeros((7, most)), np.zeros(most, np.uint8), {}
+    if shape not in made:
+        wide = [n + deep * (axis > 0 or not grid.is_slab) for axis, n in enumerate(shape)]
+        padded = Padded(memory[0, : prod(wide)].reshape(wide), bits[: prod(wide)].reshape(wide))
+        parts = (flat[: prod(shape)].reshape(shape) for flat in memory[1:])
+        made[shape] = Scratch(padded, *parts)
+    yield made[shape]
+    store.append((memory, bits, made))
 
 
 def passed_on(before: Transfers, after: Transfers, dt: float) -> Transfers:
