@@ -106,6 +106,11 @@ class PrescribedSystem(Driven):
     system: SolidSystem
     inverse: Array
 
+    def under(self, applied: Array) -> Self | None:
+        """As the step began, under another generalised force (nv,); None where it is made anew."""
+        system = self.system.under(applied)
+        return None if system is None else replace(self, system=system).solved()
+
     def answer(self, impulse: Array) -> Array:
         return np.asarray(self.inverse @ impulse)
 
