@@ -9,7 +9,6 @@ from flowborne.kernels.faces import (
     accelerate,
     changes_of_step,
     largest_open,
-    largest_size,
     mean_flux,
     mean_row,
     still_to_come,
@@ -102,4 +101,3 @@ def test_largest_size(shape: Shape) -> None:
     for part in (0.0, 0.5):
         expected = np.abs(field).max(where=opened > part, initial=0.0)
         assert largest_open(field, opened, part) == expected
-    assert largest_size(field) == np.abs(field).max()

@@ -43,8 +43,9 @@ def position_velocity(world: World, command: JointCommand) -> Array:
     """
     model, q, v = world.setup.solid, world.solid.q, world.solid.v
     exact = command.prescribed & ~np.isfinite(command.torque_limit)
-    velocity = v + follow(model, q, np.where(exact, command.rate - v, 0.0))
-    velocity[exact] = command.rate[exact]
+    velocity = np.where(exact, command.rate, v)
+    if model.flesh is not None:
+        velocity = np.where(exact, velocity, v + follow(model, q, velocity - v))
     return velocity
 
 

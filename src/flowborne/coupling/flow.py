@@ -24,7 +24,7 @@ from flowborne.coupling.world import Fluid, World
 from flowborne.fluid.boundary import cells_in
 from flowborne.fluid.control_volumes import ControlVolumes, control_volumes, face_masses
 from flowborne.fluid.dye import Dyed, Passage, carry_dye
-from flowborne.fluid.ghosts import edge, impose_sides
+from flowborne.fluid.ghosts import impose_sides, join_ends
 from flowborne.fluid.grid import copied, faces_of
 from flowborne.fluid.projection import accelerated
 from flowborne.fluid.transport import Transport, carry_component, damp_eddies
@@ -187,11 +187,10 @@ def store_state(
         change, acceleration = state.velocity[axis], state.acceleration[axis]
         passed = half.velocity[axis], advected.velocity[axis]
         changes_of_step(acceleration, change, velocity[axis], *passed, dt)
-        for values in (acceleration, change):
-            if values is acceleration or not stands:
-                values.reshape(-1)[volumes.cut[axis]] = 0.0
-            if sides.periodic()[axis]:
-                values[edge(axis, -1)] = values[edge(axis, 0)]
+        for values in (acceleration,) if stands else (acceleration, change):
+            values.reshape(-1)[volumes.cut[axis]] = 0.0
+    for field in (state.acceleration, state.velocity):
+        join_ends(field, grid, sides)
     state.velocity, state.velocity_change = velocity, state.velocity
     state.previous_pressure = state.pressure + half.pressure
     left_out = solved.pressure == 0.0

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable, Sequence
+from contextlib import ContextDecorator
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from enum import Enum
-from functools import partial, wraps
+from functools import partial
 from operator import itemgetter
 from time import perf_counter
-from typing import Annotated, Any, NamedTuple, ParamSpec, TypeVar, get_type_hints
+from typing import Annotated, Any, NamedTuple, get_type_hints
 from weakref import ref
 
 import numpy as np
@@ -22,9 +23,6 @@ from flowborne.solids.sensed import Sensed
 
 BREAKDOWNS = ArithmeticError, np.linalg.LinAlgError, BreakdownError, PartError, WorkerError
 """Errors with which a step may end; their text says what happened."""
-
-P = ParamSpec("P")
-R = TypeVar("R")
 
 Rule = Callable[[Sequence[Any]], Any]
 """Makes one value of several ones in the order of time."""
@@ -248,7 +246,7 @@ FIELDS: dict[str, Joined] = {
 _timing: ContextVar[tuple[dict[str, float], str] | None] = ContextVar("timing", default=None)
 
 
-class Timer:
+class Timer(ContextDecorator):
     """Seconds by part of a step, complete at the end of the block.
 
     Those of the block, or of the calls of a function that this decorates, count for `part`; those
@@ -258,13 +256,8 @@ class Timer:
     def __init__(self, part: str) -> None:
         self._part = part
 
-    def __call__(self, function: Callable[P, R]) -> Callable[P, R]:
-        @wraps(function)
-        def counted(*args: P.args, **kwargs: P.kwargs) -> R:
-            with Timer(self._part):
-                return function(*args, **kwargs)
-
-        return counted
+    def _recreate_cm(self) -> Timer:
+        return Timer(self._part)
 
     def __enter__(self) -> dict[str, float]:
         self._around = around = _timing.get()

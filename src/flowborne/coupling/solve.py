@@ -45,7 +45,7 @@ from flowborne.fluid.grid import Grid, copied
 from flowborne.fluid.projection import PressureGradient, face_weights
 from flowborne.kernels.arrays import ROUNDING, Array, Faces, Integers
 from flowborne.kernels.coupling_rows import fastest_closed
-from flowborne.kernels.faces import largest_open, largest_size
+from flowborne.kernels.faces import largest_open
 from flowborne.kernels.projection import open_outflow
 from flowborne.solids.driven import Driven, within_limits
 from flowborne.solids.dynamics import Kinematics
@@ -342,7 +342,7 @@ def largest_divergence(
     """Largest |D u + J v - sources| / volume of a cell, 1/s, for the motion (k,) of the bodies."""
     net = net_outflow(velocity, cut, rate, fluid)
     add_flux(net, cut, moving)
-    return largest_size(net) / fluid.grid.cell_volume
+    return float(max(net.max(), -net.min())) / fluid.grid.cell_volume
 
 
 def rounding_floor(velocity: Faces, cut: Geometry, moving: Array, grid: Grid) -> float:

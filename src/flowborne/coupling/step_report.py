@@ -125,7 +125,7 @@ def report_coupled(
         "fastest": solved.fastest,
     }
     done = report_bodies(world, dt, solved, known)
-    finite = np.isfinite(solved.pressure).all()
+    finite = np.isfinite(solved.pressure.sum())
     return done if finite else replace(done, outcome=Outcome.NOT_FINITE)
 
 

@@ -182,7 +182,7 @@ class SolidSystem(System):
         """As `System.updated`; after FULL_NEWTON_STEPS the zones are those at the minimum of the
         function between the last point and `v_plus`, so that the iteration does not cycle."""
         zones, at = self.zones_at(v_plus), v_plus
-        settled = np.array_equal(zones, self.zones)
+        settled = self.rows is None or np.array_equal(zones, self.zones)
         if self.rows is not None and not settled and self.turns >= FULL_NEWTON_STEPS:
             at = self._least_towards(v_plus, self.rows)
             zones = self.zones_at(at)
