@@ -113,12 +113,14 @@ def advect_momentum(
             taken[axis] = taken_by(jet, axis, inlets, carried.drained, grid, sides)
     if fluid.viscosity == 0.0:
         damp_eddies(faces_of(arrived), transport, grid, sides)
-    time, reached = transport.time + dt, faces_of(arrived)
-    for place, across in sides.across(grid, time) if balances else ():
-        mass = fluid.density * transport.after.moving[place.axis][place.layer]
-        change = across - reached[place.axis][place.layer]
-        stopped[place.axis] += float((mass * change).sum())
-    impose_sides(reached, grid, sides, time)
+    reached = faces_of(arrived)
+    for place, across in sides.across(grid, transport.time + dt):
+        u = reached[place.axis][place.layer]
+        if balances:
+            mass = fluid.density * transport.after.moving[place.axis][place.layer]
+            stopped[place.axis] += float((mass * (across - u)).sum())
+        u[:] = across
+    join_ends(reached, grid, sides)
     return AdvectionResult(
         reached,
         transport.after,
