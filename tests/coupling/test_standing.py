@@ -92,23 +92,29 @@ def test_what_is_not_solved_for_would_change_little(
     assert len(solves) == 2 + STEPS + 1
 
 
-def test_volumes_and_the_pressures_matrix_are_those_of_the_step_before(world: World) -> None:
+def test_volumes_and_matrices_are_those_of_the_step_before(world: World) -> None:
     command = JointCommand.none(1)
     command.set(np.array([0]), 0.0, 0.0)
     world.setup = world.setup.hypothetical
     step(world, DT, command)
     assert world.pressed is not None
     assert world.volumes is not None
-    first = world.pressed
+    step(world, DT, command)
+    first, bodies = world.pressed, world.driven
+    assert first is not None
+    assert bodies is not None
     assert first[0] is world.volumes[1]
     for _ in range(3):
         step(world, DT, command)
         assert world.pressed is first
-    assert world.copy().pressed is None
-    assert pickle.loads(pickle.dumps(world)).pressed is None
+        assert world.driven[1].system.A is bodies[1].system.A
+        assert world.driven[1] is not bodies[1]
+    for other in (world.copy(), pickle.loads(pickle.dumps(world))):
+        assert other.pressed is other.driven is None
     command.set(np.array([0]), 0.5, 0.0)
     step(world, DT, command)
     assert world.pressed is not first
+    assert world.driven[1].system.A is not bodies[1].system.A
 
 
 def test_a_flow_that_was_put_in_is_solved_for(world: World, solves: list[int]) -> None:

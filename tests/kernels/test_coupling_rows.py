@@ -13,6 +13,8 @@ from flowborne.kernels.coupling_rows import (
     WIDE,
     ClosedParts,
     add_body_velocity,
+    fastest_closed,
+    fill_empty_faces,
     flesh_rows,
     kinds_of_cells,
     list_cells,
@@ -106,5 +108,16 @@ def test_body_velocity(shape: tuple[int, int, int], skin: int) -> None:
         np.add.at(expected, tuple(at[own].T), (closed * moved)[own])
         face = np.where(own, np.ravel_multi_index(tuple(at.T), out.shape, mode="clip"), 0)
         listed = ClosedParts(axis, face, body, closed, place, corner, weight)
-        add_body_velocity(out, d, listed, twist, flesh)
+        add_body_velocity(out, d, listed, (twist, flesh))
         np.testing.assert_allclose(out, expected, atol=1e-13)
+        u, opened, held = (random.standard_normal(out.shape) for _ in range(3))
+        held[random.random(out.shape) < 0.5] = 0.0
+        met = opened * u
+        add_body_velocity(met, d, listed, (twist, flesh))
+        faces = np.unique(face[own])
+        found = fastest_closed(u, d, opened, listed, (twist, flesh))
+        assert found == np.abs(met.flat[faces]).max()
+        expected, empty = u.copy(), faces[held.flat[faces] == 0.0]
+        expected.flat[empty] = met.flat[empty]
+        fill_empty_faces(faces, u, d, held, opened, listed, (twist, flesh))
+        np.testing.assert_array_equal(u, expected)

@@ -10,7 +10,6 @@ from flowborne.kernels.faces import (
     changes_of_step,
     is_finite,
     largest_open,
-    largest_size,
     mean_flux,
     mean_row,
     still_to_come,
@@ -115,4 +114,3 @@ def test_largest_size(shape: Shape) -> None:
     for part in (0.0, 0.5):
         expected = np.abs(field).max(where=opened > part, initial=0.0)
         assert largest_open(field, opened, part) == expected
-    assert largest_size(field) == np.abs(field).max()

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flowborne.solids.driven import within_limits
+from flowborne.solids.driven import drive, within_limits
 from flowborne.solids.dynamics import assemble, kinematics
 from flowborne.solids.model import SolidModel, SolidState
 from flowborne.solids.prescribed import PrescribedSystem, prescribe
@@ -225,3 +225,28 @@ def test_holding_against_centrifugal_force() -> None:
     state = SolidState(np.array([0.2, np.pi / 2]), np.array([3.0, 0.0]))
     tau = holding(model, state, np.zeros(2), 0.01)
     np.testing.assert_allclose(tau, [0.0, 2.0 * 1.0 * 1.0 * 9.0], atol=1e-9)
+
+
+@given(seed=st.integers(0, 10_000), which=st.lists(st.booleans(), min_size=8, max_size=8))
+@settings(max_examples=40, deadline=None)
+def test_bodies_under_another_force_are_those_made_anew(seed: int, which: list[bool]) -> None:
+    """To the bit, with dampers and Coriolis forces; not on the floor, whose rows differ."""
+    model, dt, rng = CREATURE, 0.01, np.random.default_rng(seed)
+    rest, given, limit = model.rest(), np.array(which), np.full(model.nv, np.inf)
+    low, hold = 0.1 * rng.normal(size=model.nv), rng.normal(size=model.nv)
+    high = low + np.array([0.0, 0.0, 5.0, *np.zeros(model.nv - 3)])
+    forces, v = rng.normal(size=(2, model.nv)), rng.normal(size=model.nv)
+    for shift, free in ((low, False), (high, True)):
+        before = SolidState(model.integrate(rest.q, shift, 1.0), v)
+        state = SolidState(model.integrate(before.q, v, dt), v)
+        driven = [drive(model, state, f, dt, before, given, hold, limit) for f in forces]
+        driven[0].updated(driven[0].velocity + 0.1)
+        again = driven[0].under(forces[1])
+        assert (again is None) == (not free and driven[0].system.rows is not None)
+        for end in (hold, v, again.velocity) if again is not None else ():
+            np.testing.assert_array_equal(again.velocity, driven[1].velocity)
+            np.testing.assert_array_equal(again.actuator(end, v), driven[1].actuator(end, v))
+            for one, other in zip(
+                again.system.own_at(end), driven[1].system.own_at(end), strict=True
+            ):
+                np.testing.assert_array_equal(one, other)

@@ -29,14 +29,19 @@ from flowborne.solids.dynamics import Kinematics, kinematics
 from flowborne.solids.model import SolidModel, SolidState
 
 
-@timed("geometry")
 def pose_and_cut(world: World) -> tuple[Kinematics, Geometry]:
     """The bodies and the cut grid at their positions: once for each, and kept in the world."""
-    if world.cut is None or not np.array_equal(world.cut[0], world.solid.q):
+    if world.cut is None or not stand_at(world, world.cut[0]):
         with timed("solids"):
             pose = kinematics(world.setup.solid, world.solid.q)
-        world.cut = world.solid.q.copy(), pose, cut_at(world.setup, pose)
+        with timed("geometry"):
+            world.cut = world.solid.q.copy(), pose, cut_at(world.setup, pose)
     return world.cut[1:]
+
+
+def stand_at(world: World, q: Array) -> bool:
+    """Whether the bodies are exactly at the positions q (nq,)."""
+    return q.tobytes() == world.solid.q.tobytes()
 
 
 def cut_by_bodies(world: World) -> Geometry:
@@ -154,7 +159,7 @@ def gradient_on(world: World, cut: Geometry, volumes: ControlVolumes) -> Pressur
 def moved_since(world: World) -> bool:
     """Whether the bodies have been moved since the last step, or there was none."""
     _, state = world.flow()
-    return state.cell_volume.size == 0 or not np.array_equal(state.pose, world.solid.q)
+    return state.cell_volume.size == 0 or not stand_at(world, state.pose)
 
 
 def follow(world: World) -> Array:

@@ -34,7 +34,8 @@ def joint_command(world: World, dt: float, command: JointCommand | None) -> Join
                 final_velocity = velocity_after(model, world.solid.q, motion, end, span)
             command.set(motion.dofs, rate, final_velocity)
     command.prescribed[told.pushed] = False
-    command.set(model.locked, 0.0, 0.0)
+    if model.locked.any():
+        command.set(model.locked, 0.0, 0.0)
     return command
 
 

@@ -18,18 +18,19 @@ from flowborne.coupling.mouths import (
     inlets_across,
     taken_by,
 )
-from flowborne.coupling.operators import boundary_velocity, carried_at
+from flowborne.coupling.operators import boundary_velocity, motion_of
 from flowborne.coupling.solve import SolvedFlow
 from flowborne.coupling.world import Fluid, World
 from flowborne.fluid.boundary import cells_in
 from flowborne.fluid.control_volumes import ControlVolumes, control_volumes
 from flowborne.fluid.dye import Dyed, Passage, carry_dye
-from flowborne.fluid.ghosts import edge, impose_sides
+from flowborne.fluid.ghosts import impose_sides, join_ends
 from flowborne.fluid.grid import copied, faces_of
 from flowborne.fluid.projection import accelerated
 from flowborne.fluid.transport import Transport, carry_component, damp_eddies
-from flowborne.kernels.arrays import PRESCRIBED, Array, Faces
+from flowborne.kernels.arrays import Array, Faces
 from flowborne.kernels.control_volumes import stride
+from flowborne.kernels.coupling_rows import fill_empty_faces
 from flowborne.kernels.faces import changes_of_step, still_to_come
 from flowborne.solids.dynamics import Kinematics
 
@@ -41,7 +42,8 @@ class AdvectionResult:
     velocity  Faces u*, m/s
     volumes   control volumes at the end of the step
     crossed   (3,) momentum that the flow carried in through the sides, N s
-    stopped   (3,) momentum that sides with a prescribed velocity gave to the flow, N s
+    stopped   (3,) momentum that sides with a prescribed velocity gave to the flow, N s; not what
+              they did at the end without balances
     expelled  (3,) momentum that came in through mouths and sources, N s
     jets      of the mouths; those that take fluid in have the velocity of that fluid
     """
@@ -70,7 +72,8 @@ def advect(
 ) -> tuple[AdvectionResult, Dyed]:
     """Velocity and scalars a step later; `velocity` (Faces, m/s) is that at the start."""
     fluid, state = world.flow()
-    carried, dyed = advect_momentum(start, velocity, transport), Dyed({}, 0.0)
+    carried = advect_momentum(start, velocity, transport, world.setup.balances)
+    dyed = Dyed({}, 0.0)
     if state.scalars:
         inflow = brought_by(start.jets, start.rate, tuple(state.scalars))
         backwards = world.steps % 2 == 1
@@ -79,7 +82,9 @@ def advect(
     return carried, dyed
 
 
-def advect_momentum(start: Departure, velocity: Faces, transport: Transport) -> AdvectionResult:
+def advect_momentum(
+    start: Departure, velocity: Faces, transport: Transport, balances: bool
+) -> AdvectionResult:
     """Every component on its moving control volumes; nothing is lost (see `fluid.transport`).
 
     velocity   Faces at the start, with half of the last pressure, m/s
@@ -101,21 +106,23 @@ def advect_momentum(start: Departure, velocity: Faces, transport: Transport) -> 
         arrived.insert(axis, carried.velocity)
         crossed[axis] = fluid.density * carried.crossed
         stopped[axis] = fluid.density * carried.held
-        brought = dt * float(inlets.gain @ inlets.velocity)
-        gained[axis] = fluid.density * (brought - float(carried.drained.sum()))
+        if cells.size:
+            brought = dt * float(inlets.gain @ inlets.velocity)
+            gained[axis] = fluid.density * (brought - float(carried.drained.sum()))
         for jet, taken in zip(jets, drunk, strict=True):
             taken[axis] = taken_by(jet, axis, inlets, carried.drained, grid, sides)
     if fluid.viscosity == 0.0:
         damp_eddies(faces_of(arrived), transport, grid, sides)
-    for place, side in sides.around(grid):
-        u = arrived[place.axis]
-        before = u[place.layer].copy()
-        side.impose(u, place, transport.time + dt)
-        if side.normal == PRESCRIBED:
+    reached = faces_of(arrived)
+    for place, across in sides.across(grid, transport.time + dt):
+        u = reached[place.axis][place.layer]
+        if balances:
             mass = fluid.density * transport.after.moving[place.axis][place.layer]
-            stopped[place.axis] += float((mass * (u[place.layer] - before)).sum())
+            stopped[place.axis] += float((mass * (across - u)).sum())
+        u[:] = across
+    join_ends(reached, grid, sides)
     return AdvectionResult(
-        faces_of(arrived),
+        reached,
         transport.after,
         crossed,
         stopped,
@@ -134,8 +141,9 @@ def apply_body_force_and_sides(
     time  s at the end of the step
     """
     grid, density = fluid.grid, fluid.density
-    drives = [s for s in fluid.sources if s.velocity is not None and s.active(time)]
-    if not drives and not any(fluid.body_force):
+    sources = [(s, s.velocity) for s in fluid.sources if s.active(time)]
+    driven = [(cells_in(s, grid), u) for s, u in sources if u is not None]
+    if not driven and not any(fluid.body_force):
         return advected.velocity
     velocity = copied(advected.velocity, grid)
     if any(fluid.body_force):
@@ -143,11 +151,10 @@ def apply_body_force_and_sides(
         for axis in grid.axes:
             velocity[axis][:] += dt * density * fluid.body_force[axis] * grid.spacing * rates[axis]
     for axis in grid.axes:
-        for source in drives:
-            assert source.velocity is not None
-            box = list(cells_in(source, grid))
+        for cells, driven_velocity in driven:
+            box = list(cells)
             box[axis] = slice(box[axis].start, box[axis].stop + 1)
-            velocity[axis][tuple(box)] = source.velocity[axis]
+            velocity[axis][tuple(box)] = driven_velocity[axis]
     impose_sides(velocity, grid, fluid.boundaries, time)
     return velocity
 
@@ -180,11 +187,10 @@ def store_state(
         change, acceleration = state.velocity[axis], state.acceleration[axis]
         passed = half.velocity[axis], advected.velocity[axis]
         changes_of_step(acceleration, change, velocity[axis], *passed, dt)
-        for values in (acceleration, change):
-            if values is acceleration or not stands:
-                values.reshape(-1)[volumes.cut[axis]] = 0.0
-            if sides.periodic()[axis]:
-                values[edge(axis, -1)] = values[edge(axis, 0)]
+        for values in (acceleration,) if stands else (acceleration, change):
+            values.reshape(-1)[volumes.cut[axis]] = 0.0
+    for field in (state.acceleration, state.velocity):
+        join_ends(field, grid, sides)
     state.previous_pressure, state.pressure = state.pressure, solved.pressure
     if half.velocity is not state.velocity:  # else none acted
         left_out = solved.pressure == 0.0
@@ -203,12 +209,12 @@ def fill_with_leak_proof(
 
     moving  (k,) see `operators.leak_proof`
     """
-    grid, sides = fluid.grid, fluid.boundaries
+    grid, sides, motion = fluid.grid, fluid.boundaries, motion_of(cut, moving)
     for axis in grid.axes:
         faces = np.concatenate([volumes.cut[axis], volumes.closed[axis].faces])
         if sides.periodic()[axis]:  # the last ones are the first ones
             shape = grid.face_shape(axis)
             first = faces[np.unravel_index(faces, shape)[axis] == 0]
             faces = np.append(faces, first + grid.shape[axis] * stride(shape, axis))
-        empty = faces[volumes.moving[axis].reshape(-1)[faces] == 0.0]
-        velocity[axis].reshape(-1)[empty] = carried_at(empty, axis, velocity, cut, moving)
+        held, opened = volumes.moving[axis], cut.open[axis]
+        fill_empty_faces(faces, velocity[axis], axis, held, opened, cut.closed, motion)

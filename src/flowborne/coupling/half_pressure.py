@@ -33,8 +33,8 @@ class HalfPressure:
     velocity  Faces of the fluid with it, m/s
     pressure  (nx, ny, nz) of which it is made, Pa
     impulse   (k,) on the bodies, see `SolvedFlow`
-    sides     (3,) impulse of the sides on the fluid, N s
-    start     (3,) momentum of the fluid without it, N s; nan without balances
+    sides     (3,) impulse of the sides on the fluid, N s; nan without balances
+    start     (3,) momentum of the fluid without it, N s; likewise
     """
 
     velocity: Faces
@@ -78,7 +78,9 @@ def explicit_half_pressure(world: World, start: Departure, dt: float) -> HalfPre
     state.pressure -= half
     velocity = faces_of([u + part * k for u, k in zip(state.velocity, last, strict=True)])
     start.volumes.follow(velocity, grid)
-    pushed = dt * side_push(half, opened, gradient)
+    pushed = np.full(3, np.nan)
+    if world.setup.balances:
+        pushed = dt * side_push(half, opened, gradient)
     impulse = pressure_push(start.cut, dt * half, size)
     return HalfPressure(velocity, half, impulse, pushed, momentum)
 

@@ -44,10 +44,10 @@ from flowborne.coupling.operators import beyond_sides
 from flowborne.coupling.world import World
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.control_volumes import NONE
-from flowborne.fluid.ghosts import impose_sides, plane, planes
+from flowborne.fluid.ghosts import join_ends, plane, planes
 from flowborne.fluid.grid import Grid
 from flowborne.fluid.projection import PressureGradient
-from flowborne.kernels.arrays import PERIODIC, PRESCRIBED, Array, Faces, Integers, Marks
+from flowborne.kernels.arrays import Array, Faces, Integers, Marks
 from flowborne.kernels.control_volumes import neighbour
 from flowborne.kernels.dye import face_of
 from flowborne.kernels.faces import mean_flux
@@ -219,13 +219,12 @@ def drive_sides(flux: Faces, weights: Faces, grid: Grid, sides: Boundaries, time
 
     Half a control volume belongs to a face on a side; one whose flux is prescribed has no weight.
     """
-    impose_sides(flux, grid, sides, time)
-    for place, side in sides.around(grid):
-        through, weight = (field[place.axis][place.layer] for field in (flux, weights))
-        if side.normal == PRESCRIBED:
-            through *= weight * (grid.face_area / stiffness(grid))
-        if side.normal != PERIODIC:
-            weight *= 2.0 * side.pressure_weight(place)
+    for place, across in sides.across(grid, time):
+        weight = weights[place.axis][place.layer]
+        flux[place.axis][place.layer] = across * (weight * (grid.face_area / stiffness(grid)))
+    join_ends(flux, grid, sides)
+    for place, part in sides.pressure_weights(grid):
+        weights[place.axis][place.layer] *= 2.0 * part
 
 
 def balanced(

@@ -15,11 +15,11 @@ from flowborne.coupling.fractions import Geometry
 from flowborne.fluid.dipoles import Dipoles
 from flowborne.fluid.grid import Grid, faces_of
 from flowborne.fluid.projection import PressureGradient
-from flowborne.kernels.arrays import FREE, Array, DenseTerm, Faces, Integers
-from flowborne.kernels.coupling_rows import add_body_velocity
+from flowborne.kernels.arrays import FREE, Array, DenseTerm, Faces
+from flowborne.kernels.coupling_rows import Motion, add_body_velocity
+from flowborne.kernels.momentum import about_origin
 from flowborne.kernels.sparse_rows import add_rows, sum_rows
 from flowborne.solids.dynamics import Kinematics
-from flowborne.solids.scratch import cross
 from flowborne.solvers.pressure import NO_DENSE_TERM
 
 
@@ -60,26 +60,14 @@ def leak_proof(velocity: Faces, geometry: Geometry, moving: Array, grid: Grid) -
 def carried(axis: int, velocity: Faces, geometry: Geometry, moving: Array) -> Array:
     """Its component along an axis."""
     field = geometry.open[axis] * velocity[axis]
-    add_bodies(field, axis, geometry, moving)
+    add_body_velocity(field, axis, geometry.closed, motion_of(geometry, moving))
     return field
 
 
-def carried_at(
-    faces: Integers, axis: int, velocity: Faces, geometry: Geometry, moving: Array
-) -> Array:
-    """(n,) the same on some of the faces across an axis, flat."""
-    field = np.empty(velocity[axis].shape)  # only what is asked for has a meaning
-    flat, opened = field.reshape(-1), geometry.open[axis].reshape(-1)
-    flat[faces] = opened[faces] * velocity[axis].reshape(-1)[faces]
-    add_bodies(field, axis, geometry, moving)
-    return flat[faces]
-
-
-def add_bodies(out: Array, axis: int, geometry: Geometry, moving: Array) -> None:
-    """Add closed part x body velocity on the faces across `axis`, in place, for the motion (k,)."""
+def motion_of(geometry: Geometry, moving: Array) -> Motion:
+    """The motion (k,) as kernels take it."""
     first = moving.size - geometry.skins.vertices.size
-    twist, flesh = moving[:first].reshape(-1, 6), moving[first:].reshape(-1, 3)
-    add_body_velocity(out, axis, geometry.closed, twist, flesh)
+    return moving[:first].reshape(-1, 6), moving[first:].reshape(-1, 3)
 
 
 def add_flux(out: Array, geometry: Geometry, moving: Array) -> None:
@@ -96,7 +84,7 @@ def pressure_push(geometry: Geometry, pressure: Array, size: int) -> Array:
 def buoyancy_wrench(centroid: Array, volume: Array, gravity: Array, density: float) -> Array:
     """(nbody, 6) Archimedes' force -rho g V at the centroid of each body's displaced volume."""
     force = -density * volume[:, None] * gravity[None, :]
-    return np.concatenate([force, cross(centroid, force)], axis=1)
+    return about_origin(force, np.zeros(force.shape), centroid)
 
 
 def beyond_sides(dipoles: Dipoles | None, strength: float) -> DenseTerm:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
+from contextlib import ContextDecorator
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from enum import Enum
@@ -246,21 +246,33 @@ FIELDS: dict[str, Joined] = {
 _timing: ContextVar[tuple[dict[str, float], str] | None] = ContextVar("timing", default=None)
 
 
-@contextmanager
-def timed(part: str) -> Iterator[dict[str, float]]:
+class Timer(ContextDecorator):
     """Seconds by part of a step, complete at the end of the block.
 
     Those of the block, or of the calls of a function that this decorates, count for `part`; those
     of a timed block or function inside it for its own part alone.
     """
-    around = _timing.get()
-    seconds = defaultdict[str, float](float) if around is None else around[0]
-    token, started = _timing.set((seconds, part)), perf_counter()
-    try:
-        yield seconds
-    finally:
-        _timing.reset(token)
-        spent = perf_counter() - started
-        seconds[part] += spent
-        if around is not None:
-            seconds[around[1]] -= spent
+
+    def __init__(self, part: str) -> None:
+        self._part = part
+
+    def _recreate_cm(self) -> Timer:
+        return Timer(self._part)
+
+    def __enter__(self) -> dict[str, float]:
+        self._around = around = _timing.get()
+        self._seconds = defaultdict[str, float](float) if around is None else around[0]
+        self._token = _timing.set((self._seconds, self._part))
+        self._started = perf_counter()
+        return self._seconds
+
+    def __exit__(self, *_: object) -> None:
+        _timing.reset(self._token)
+        spent = perf_counter() - self._started
+        self._seconds[self._part] += spent
+        if self._around is not None:
+            self._seconds[self._around[1]] -= spent
+
+
+timed = Timer
+"""As one says it, around a block or a function."""

@@ -21,6 +21,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
+from math import prod, sqrt
 
 import numpy as np
 
@@ -31,8 +32,8 @@ from flowborne.coupling.operators import (
     add_flux,
     beyond_sides,
     boundary_velocity,
-    carried_at,
     generalised,
+    motion_of,
     pressure_push,
     side_push,
 )
@@ -43,7 +44,8 @@ from flowborne.fluid.control_volumes import ControlVolumes
 from flowborne.fluid.grid import Grid
 from flowborne.fluid.projection import PressureGradient, face_weights
 from flowborne.kernels.arrays import ROUNDING, Array, Faces, Integers
-from flowborne.kernels.faces import largest_open, largest_size
+from flowborne.kernels.coupling_rows import fastest_closed
+from flowborne.kernels.faces import largest_open
 from flowborne.kernels.projection import open_outflow
 from flowborne.solids.driven import Driven, within_limits
 from flowborne.solids.dynamics import Kinematics
@@ -96,7 +98,7 @@ class SolvedFlow(Solved):
     velocity         Faces u+, m/s
     pressure         (nx, ny, nz) p, Pa
     impulse          (k,) J^T p^
-    sides            (3,) impulse of the sides on the fluid, N s
+    sides            (3,) impulse of the sides on the fluid, N s; nan without balances
     iterations       of the pressure solve, all turns of a step together
     residual         true relative residual
     divergence       largest |net outflow of a cell| / volume, 1/s; nan without balances
@@ -182,7 +184,8 @@ def solve_together(
         tolerance = max(tolerance, ROUGH)
     rate = source_rate(fluid, world.time + dt, cut.open)
     add_rates(rate, jets)
-    smooth, viscous, smoothed = diffuse(world, velocity, volumes, gradient, cut, jets, pose, driven)
+    given = world, velocity, volumes, gradient, cut, jets, pose
+    smooth, viscous, smoothed = diffuse(*given, driven)
     term = LowRankTerm(cut.rows, mobility)
     net, area = np.empty(fluid.grid.shape), fluid.grid.face_area
     open_outflow(net, cut.open, smooth, rate, area)
@@ -204,9 +207,7 @@ def solve_together(
         if changed is not None:
             if not changed.same_mobility(driven):
                 term = replace(term, mobility=changed.mobility(pose))
-                smooth, viscous, smoothed = diffuse(
-                    world, velocity, volumes, gradient, cut, jets, pose, changed
-                )
+                smooth, viscous, smoothed = diffuse(*given, changed)
                 open_outflow(net, cut.open, smooth, rate, area)
             tried, driven = driven, changed
         tolerance = fluid.tolerance
@@ -219,16 +220,19 @@ def solve_together(
         outcome = Outcome.VISCOSITY_NOT_CONVERGED
     if not solution.converged:
         outcome = Outcome.PRESSURE_NOT_CONVERGED
-    change = boundary_velocity(pose, v - driven.system.v)
     plain = partial(pressure_system, gradient, cut.open)
-    added_mass: Array | Callable[[], Array] = np.full(change.size, np.nan)
+    added_mass: Array | Callable[[], Array] = np.full(start.size, np.nan)
+    pushed = np.full(3, np.nan)
     divergence = fastest = np.nan
+    if world.setup.balances or world.setup.splits:
+        change = boundary_velocity(pose, v - driven.system.v)
     if world.setup.balances:
         moved = start + term.mobility.times(on_solids)
         open_outflow(net, cut.open, after, rate, area)
         add_flux(net, cut, moved)
-        divergence = largest_size(net) / fluid.grid.cell_volume
+        divergence = float(max(net.max(), -net.min())) / fluid.grid.cell_volume
         fastest = max(largest_open(after[axis], cut.open[axis], 0.0) for axis in fluid.grid.axes)
+        pushed = side_push(solution.pressure, cut.open, gradient)
         added_mass = partial(added_mass_impulse, plain, cut, change)
     if world.setup.splits:
         own = (lambda: matrix) if mobility.is_dense else plain
@@ -245,7 +249,7 @@ def solve_together(
         velocity=after,
         pressure=solution.pressure / dt,
         impulse=on_solids,
-        sides=side_push(solution.pressure, cut.open, gradient),
+        sides=pushed,
         iterations=iterations,
         residual=solution.residual,
         divergence=divergence,
@@ -332,9 +336,9 @@ def rounding_floor(velocity: Faces, cut: Geometry, moving: Array, grid: Grid) ->
 
     Of fluid and bodies in motion (k,): a body that turns displaces less than its faces move.
     """
-    fastest = 0.0
+    motion, fastest = motion_of(cut, moving), 0.0
     for axis in grid.axes:
-        faces = cut.closed.face[cut.closed.axis == axis]
-        met = np.abs(carried_at(faces, axis, velocity, cut, moving)).max(initial=0.0)
-        fastest = max(fastest, met, largest_open(velocity[axis], cut.open[axis], 1.0 - ROUNDING))
-    return float(ROUNDING * grid.face_area * fastest * np.sqrt(np.prod(grid.shape)))
+        u, opened = velocity[axis], cut.open[axis]
+        met = fastest_closed(u, axis, opened, cut.closed, motion)
+        fastest = max(fastest, met, largest_open(u, opened, 1.0 - ROUNDING))
+    return ROUNDING * grid.face_area * fastest * sqrt(prod(grid.shape))

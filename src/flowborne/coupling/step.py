@@ -85,8 +85,10 @@ def step(world: World, dt: float, command: JointCommand | None = None) -> StepRe
             if reports[-1].outcome is not Outcome.DONE:
                 break
         done = joined(reports)
-    crossed = done.momentum_crossed + came
-    return replace(done, momentum_crossed=crossed, seconds=dict(seconds))
+    if came.any():
+        done = replace(done, momentum_crossed=done.momentum_crossed + came)
+    done.seconds.update(seconds)
+    return done
 
 
 def step_part(world: World, dt: float, command: JointCommand) -> StepReport:

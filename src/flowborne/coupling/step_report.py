@@ -49,7 +49,7 @@ def report_failed(model: SolidModel, dt: float, outcome: Outcome) -> StepReport:
 def report_bodies(world: World, dt: float, solved: Solved, known: dict[str, Any]) -> StepReport:
     """Of a step without a fluid.
 
-    known  what the report says of winds; of all of the fluid, if there is one
+    known  what the report says of the forces of winds and of the fluid
     """
     before, model = solved.driven.system.v, world.setup.solid
     velocity = 0.5 * (before + solved.v)
@@ -67,7 +67,7 @@ def report_bodies(world: World, dt: float, solved: Solved, known: dict[str, Any]
         contacts=solved.driven.system.contacts,
         limited=solved.driven.limited.nonzero()[0],
         unsettled=solved.unsettled,
-        **fluid_forces(model, 0.0) | balance | known,
+        **balance | known,
     )
 
 

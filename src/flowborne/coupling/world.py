@@ -23,6 +23,7 @@ from flowborne.fluid.window import Window, crosses
 from flowborne.kernels.arrays import Array
 from flowborne.solids.dynamics import Kinematics
 from flowborne.solids.model import SolidModel, SolidState
+from flowborne.solids.prescribed import PrescribedSystem
 from flowborne.solids.trajectories import NOTHING_TOLD, Told, Trajectory
 from flowborne.solids.wind import Wind
 from flowborne.solvers.pressure import PressureSystem
@@ -150,6 +151,7 @@ class World:
             that projection, which a copy makes anew; likewise
     pressed the control volumes that the last step ended with, the gradient of the pressure on them,
             and its matrix; likewise
+    driven  what the equations of the bodies in the last step were made from, and these; likewise
     splitting
             make the added-mass part of forces, for each part of the last step; likewise
     """
@@ -171,10 +173,13 @@ class World:
     pressed: tuple[ControlVolumes, PressureGradient, PressureSystem] | None = field(
         default=None, repr=False, compare=False
     )
+    driven: tuple[tuple[object, ...], PrescribedSystem] | None = field(
+        default=None, repr=False, compare=False
+    )
     splitting: tuple[Callable[[], Array], ...] = field(default=(), repr=False, compare=False)
 
     def __getstate__(self) -> dict[str, object]:
-        kept = dict.fromkeys(("cut", "volumes", "still", "pressed"))
+        kept = dict.fromkeys(("cut", "volumes", "still", "pressed", "driven"))
         return vars(self) | kept | {"splitting": ()}
 
     @classmethod
@@ -202,7 +207,7 @@ class World:
         fluid = None if self.fluid is None else self.fluid.copy()
         memory = {name: values.copy() for name, values in self.memory.items()}
         copy = replace(self, solid=self.solid.copy(), fluid=fluid, memory=memory)
-        copy.still = copy.pressed = None
+        copy.still = copy.pressed = copy.driven = None
         return copy
 
     def arrays(self) -> dict[str, Array]:

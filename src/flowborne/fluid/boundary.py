@@ -16,7 +16,7 @@ from flowborne.fluid.grid import Grid
 from flowborne.fluid.sides.far import Sea, sea_of
 from flowborne.fluid.sides.kinds import BoundaryClosed
 from flowborne.fluid.sides.side import Boundary, Place
-from flowborne.kernels.arrays import FREE, PERIODIC, FaceGrid, Integers
+from flowborne.kernels.arrays import FREE, PERIODIC, PRESCRIBED, Array, FaceGrid, Integers
 
 if TYPE_CHECKING:
     from flowborne.kernels.carry import Sides
@@ -71,6 +71,25 @@ class Around:
     @cached_property
     def layers(self) -> dict[tuple[int, int], Sides] | None:
         return {} if all(side.steady for _, side in self.sides) else None
+
+    @cached_property
+    def steady_across(self) -> list[tuple[Place, Array | float]] | None:
+        return None if self.layers is None else self.across(0.0)
+
+    def across(self, time: float) -> list[tuple[Place, Array | float]]:
+        return [
+            (place, side.prescribed_velocity(place, place.axis, time))
+            for place, side in self.sides
+            if side.normal == PRESCRIBED
+        ]
+
+    @cached_property
+    def weights(self) -> list[tuple[Place, Array | float]]:
+        return [
+            (place, side.pressure_weight(place))
+            for place, side in self.sides
+            if side.normal != PERIODIC
+        ]
 
     @cached_property
     def sea(self) -> Sea | None:
@@ -136,6 +155,16 @@ class Boundaries:
         """What steady sides prescribe to the velocity, to be filled by `ghosts.packed_sides`; None
         where one of a grid is not steady."""
         return self._on(grid).layers
+
+    def across(self, grid: Grid, time: float) -> list[tuple[Place, Array | float]]:
+        """Places of the sides that prescribe the velocity across them, and that at `time` (s), m/s;
+        of steady sides kept."""
+        around = self._on(grid)
+        return around.steady_across or around.across(time)
+
+    def pressure_weights(self, grid: Grid) -> list[tuple[Place, Array | float]]:
+        """Places of the sides that are not periodic, and their `pressure_weight`."""
+        return self._on(grid).weights
 
     def normal(self) -> Integers:
         """(3, 2) a of the velocity across the lower and upper side of each axis: PRESCRIBED, FREE

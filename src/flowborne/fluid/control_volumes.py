@@ -14,7 +14,8 @@ out what they have beyond a h^3, by diffusion along one axis after the other.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -25,6 +26,9 @@ from flowborne.kernels.arrays import Array, Faces, Integers
 from flowborne.kernels.control_volumes import Closed, Transfers, share_velocity
 from flowborne.kernels.face_masses import find_moving
 from flowborne.kernels.faces import weighted_sums
+
+if TYPE_CHECKING:
+    from flowborne.kernels.carry import Volumes
 
 NOTHING = 1e-9
 """Part of a cell below which a control volume holds nothing."""
@@ -50,6 +54,7 @@ class ControlVolumes:
     cut        of each axis, (n,) flat indices of those that are not whole
     closed     of each axis
     transfers  of each axis, from V_f to M_f
+    staying    by component, dt and what `transport` makes of them for a step in which they stay
     """
 
     cells: Array
@@ -57,6 +62,9 @@ class ControlVolumes:
     cut: tuple[Integers, Integers, Integers]
     closed: tuple[Closed, Closed, Closed]
     transfers: tuple[Transfers, Transfers, Transfers]
+    staying: dict[int, tuple[float, Volumes, Transfers]] = field(
+        default_factory=dict, repr=False, compare=False
+    )
 
     def follow(self, velocity: Faces, grid: Grid) -> None:
         """Give closed faces the velocity of their targets, in place."""

@@ -40,8 +40,16 @@ def planes(faces: Faces, grid: Grid) -> Faces:
 
 def impose_sides(velocity: Faces, grid: Grid, boundaries: Boundaries, time: float) -> None:
     """Set the normal velocity on the sides that prescribe it, and join periodic ends."""
-    for place, side in boundaries.around(grid):
-        side.impose(velocity[place.axis], place, time)
+    for place, across in boundaries.across(grid, time):
+        velocity[place.axis][place.layer] = across
+    join_ends(velocity, grid, boundaries)
+
+
+def join_ends(field: Faces, grid: Grid, boundaries: Boundaries) -> None:
+    """Give the last faces of each periodic axis what the first ones have."""
+    for axis in grid.axes:
+        if boundaries.periodic()[axis]:
+            field[axis][edge(axis, -1)] = field[axis][edge(axis, 0)]
 
 
 def packed_sides(
@@ -54,9 +62,9 @@ def packed_sides(
     """
     kept = boundaries.steady_layers(grid)
     if kept is not None and (component, len(times)) in kept:
-        known = kept[component, len(times)]
-        return known._replace(rate=np.zeros(known.rate.size), share=np.zeros(known.rate.size))
-    table, walls, changes, first = [], [], [], 0
+        table, wide, along, rate, share = kept[component, len(times)]
+        return Sides(table, wide, along, np.zeros(rate.size), np.zeros(share.size))
+    rows, walls, changes, first = [], [], [], 0
     shape = grid.face_shape(component)
     for place, side in boundaries.around(grid):
         own, layer = place.axis == component, list(shape)
@@ -75,12 +83,12 @@ def packed_sides(
             normal = flux[place.axis][place.layer] / grid.face_area
             change = tangential_change(normal, place, component, boundaries.periodic()[component])
         axis, rules = place.axis + grid.is_slab, (side.normal, side.tangential)
-        table.append((axis, place.upper, *rules, side.supplies, first, still))
+        rows.append((axis, place.upper, *rules, side.supplies, first, still))
         walls.append(prescribed)
         changes.append(change.reshape(-1))
         first += size
     wide, along = np.concatenate(walls, axis=1), np.concatenate(changes)
-    made = Sides(np.array(table, np.int64), wide, along, np.zeros(first), np.zeros(first))
+    made = Sides(np.array(rows, np.int64), wide, along, np.zeros(first), np.zeros(first))
     if kept is not None:
         kept[component, len(times)] = made
     return made

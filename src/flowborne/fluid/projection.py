@@ -37,8 +37,8 @@ def accelerated(
     rates = grid.empty_faces()
     for axis in grid.axes:
         accelerate(rates[axis], opened[axis], volumes[axis], density, grid.face_area)
-    for place, side in boundaries.around(grid):
-        rates[place.axis][place.layer] *= side.pressure_weight(place)
+    for place, weight in boundaries.pressure_weights(grid):
+        rates[place.axis][place.layer] *= weight
     return rates
 
 

@@ -33,9 +33,9 @@ import numpy as np
 
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.control_volumes import NONE, NOTHING, ControlVolumes
-from flowborne.fluid.ghosts import edge, packed_sides, plane, planes
+from flowborne.fluid.ghosts import join_ends, packed_sides, plane, planes
 from flowborne.fluid.grid import Grid
-from flowborne.kernels.arrays import Array, Faces, Integers, Marks, Three
+from flowborne.kernels.arrays import Array, FaceGrid, Faces, Integers, Marks, Three
 from flowborne.kernels.carry import Exchange, Inlets, Scratch, Volumes, carry
 from flowborne.kernels.control_volumes import Transfers, merged
 from flowborne.kernels.eddies import exchange, exchanges_near
@@ -154,24 +154,14 @@ def carry_component(
               nothing
     """
     count, faces = transport.substeps(grid), sides.faces(component, grid)
-    before, after, dt = transport.before, transport.after, transport.dt / count
+    dt = transport.dt / count
     times = [transport.time + n * dt for n in range(count + 1)]
     table = packed_sides(component, grid, sides, times, transport.flux)
     ring = sides.periodic()[component]
     means = neighbours(int(faces.shape[faces.component]), ring)
     flux = Fluxes(planes(transport.flux, grid), faces.component, *means)
-    given = passed_on(before.transfers[component], after.transfers[component], transport.dt)
+    volumes, given = volumes_between(transport, faces, component, grid)
     exchange, out = Exchange(flux, table, inlets, given), np.empty(velocity.shape)
-    volumes = Volumes(
-        plane(before.cells, grid),
-        plane(before.moving[component], grid),
-        plane(after.moving[component], grid),
-        merged(before.cut[component], after.cut[component])[0],
-        before.closed[component],
-        after.closed[component],
-        faces,
-        NOTHING * grid.cell_volume,
-    )
     rising = 0.0 if along is None else transport.extrapolated(grid)
     more = plane(velocity if along is None else along, grid)
     fields = plane(out, grid), plane(velocity, grid), more
@@ -180,7 +170,32 @@ def carry_component(
     return Carried(out, crossed, held, drained)
 
 
-_spare: dict[tuple[int, int, int], list[tuple[Array, Marks]]] = {}
+def volumes_between(
+    transport: Transport, faces: FaceGrid, component: int, grid: Grid
+) -> tuple[Volumes, Transfers]:
+    """The control volumes of a component in a step, and what they pass on; those that stay keep
+    both."""
+    before, after, dt = transport.before, transport.after, transport.dt
+    known = before.staying.get(component) if before is after else None
+    if known is None or known[0] != dt:
+        volumes = Volumes(
+            plane(before.cells, grid),
+            plane(before.moving[component], grid),
+            plane(after.moving[component], grid),
+            merged(before.cut[component], after.cut[component])[0],
+            before.closed[component],
+            after.closed[component],
+            faces,
+            NOTHING * grid.cell_volume,
+        )
+        given = passed_on(before.transfers[component], after.transfers[component], dt)
+        known = dt, volumes, given
+        if before is after:
+            before.staying[component] = known
+    return known[1:]
+
+
+_spare: dict[Three, list[tuple[Array, Marks, dict[Three, Scratch]]]] = {}
 
 
 @contextmanager
@@ -189,14 +204,17 @@ def borrowed(grid: Grid, shape: Three) -> Iterator[Scratch]:
     kept for the next one."""
     store, deep = _spare.setdefault(grid.shape, []), 2 * GHOSTS
     try:
-        memory, bits = store.pop()
+        memory, bits, made = store.pop()
     except IndexError:
         most = prod(n + 1 + deep if axis in grid.axes else n for axis, n in enumerate(grid.shape))
-        memory, bits = np.zeros((7, most)), np.zeros(most, np.uint8)
-    wide = [n + deep * (axis > 0 or not grid.is_slab) for axis, n in enumerate(shape)]
-    padded = Padded(memory[0, : prod(wide)].reshape(wide), bits[: prod(wide)].reshape(wide))
-    yield Scratch(padded, *(flat[: prod(shape)].reshape(shape) for flat in memory[1:]))
-    store.append((memory, bits))
+        memory, bits, made = np.zeros((7, most)), np.zeros(most, np.uint8), {}
+    if shape not in made:
+        wide = [n + deep * (axis > 0 or not grid.is_slab) for axis, n in enumerate(shape)]
+        padded = Padded(memory[0, : prod(wide)].reshape(wide), bits[: prod(wide)].reshape(wide))
+        parts = (flat[: prod(shape)].reshape(shape) for flat in memory[1:])
+        made[shape] = Scratch(padded, *parts)
+    yield made[shape]
+    store.append((memory, bits, made))
 
 
 def passed_on(before: Transfers, after: Transfers, dt: float) -> Transfers:
@@ -221,6 +239,4 @@ def damp_eddies(velocity: Faces, transport: Transport, grid: Grid, sides: Bounda
         found.append((*flow, held, *exchanges_near(flow, held, listed, axis, wraps, GHOSTS, rate)))
     for each in found:
         exchange(*each)
-    for axis in grid.axes:
-        if sides.periodic()[axis]:
-            velocity[axis][edge(axis, -1)] = velocity[axis][edge(axis, 0)]
+    join_ends(velocity, grid, sides)

@@ -87,7 +87,8 @@ def _with_layer(
             told = side.prescribed_velocity(new, component, time)
             layer = np.broadcast_to(told, layer.shape)
         found[component] = shifted(state.velocity[component], axis, upper, layer)
-    side.impose(found[axis], new, time)
+    if side.normal == PRESCRIBED:
+        found[axis][new.layer] = side.prescribed_velocity(new, axis, time)
     return faces_of(found)
 
 

@@ -173,14 +173,14 @@ def flesh_rows(
     return part[:rows], (cells[:rows], start, columns[: 3 * rows], values[: 3 * rows])
 
 
-@njit(nogil=True, cache=True)
-def add_body_velocity(
-    out: Array, axis: int, parts: ClosedParts, twist: Array, flesh: Array
-) -> None:
-    """Add closed fraction x body velocity on the faces across `axis`, at the centres of the parts.
+Motion = tuple[Array, Array]
+"""(nbody, 6) twist of the bodies, (n, 3) velocity of the vertices of flesh."""
 
-    twist, flesh  (nbody, 6) of the bodies, (n, 3) velocity of the vertices
-    """
+
+@njit(nogil=True, cache=True)
+def add_body_velocity(out: Array, axis: int, parts: ClosedParts, motion: Motion) -> None:
+    """Add closed part x body velocity on the faces across `axis`, at the centres of the parts."""
+    twist, flesh = motion
     axes, faces, bodies, closed, place, corner, weight = parts
     flat_out = out.reshape(-1)
     rigid, one, other = axes.size - len(corner), (axis + 1) % 3, (axis + 2) % 3
@@ -197,3 +197,38 @@ def add_body_velocity(
         t, p = twist[bodies[n]], place[n]
         velocity = t[axis] + t[3 + one] * p[other] - t[3 + other] * p[one]
         flat_out[f] += closed[n] * velocity
+
+
+@njit(nogil=True, cache=True)
+def carried_at(
+    faces: Integers, u: Array, axis: int, opened: Array, parts: ClosedParts, motion: Motion
+) -> Array:
+    """Open part x u + closed part x body velocity across `axis`, flat; on these faces alone."""
+    field = np.empty(u.shape)
+    found, flow, part = field.reshape(-1), u.reshape(-1), opened.reshape(-1)
+    for f in faces:
+        found[f] = part[f] * flow[f]
+    add_body_velocity(field, axis, parts, motion)
+    return found
+
+
+@njit(nogil=True, cache=True)
+def fill_empty_faces(
+    faces: Integers, u: Array, axis: int, held: Array, opened: Array, parts: ClosedParts,
+    motion: Motion,
+) -> None:  # fmt: skip
+    """Give those of these faces of which `held` is 0 the value of `carried_at`, in place."""
+    found = carried_at(faces, u, axis, opened, parts, motion)
+    for f in faces:
+        if held.reshape(-1)[f] == 0.0:
+            u.reshape(-1)[f] = found[f]
+
+
+@njit(nogil=True, cache=True)
+def fastest_closed(u: Array, axis: int, opened: Array, parts: ClosedParts, motion: Motion) -> float:
+    """Largest size of `carried_at` on the faces across `axis` that bodies close in part."""
+    faces, most = parts.face[parts.axis == axis], 0.0
+    found = carried_at(faces, u, axis, opened, parts, motion)
+    for f in faces:
+        most = max(most, abs(found[f]))
+    return most

@@ -151,6 +151,7 @@ def weighted_sums(
 
 
 @kernel
+@kernel
 def is_finite(field: Array) -> bool:
     """Whether all values of a field are finite numbers."""
     values, wrong = flat(field), np.zeros(field.shape[0], np.int64)
@@ -160,19 +161,6 @@ def is_finite(field: Array) -> bool:
             found += int(not abs(values[i, k]) < np.inf)
         wrong[i] = found
     return not wrong.any()
-
-
-@kernel
-def largest_size(field: Array) -> float:
-    """Largest size of a field."""
-    values, most = flat(field), np.zeros(field.shape[0])
-    for i in prange(values.shape[0]):
-        found = 0.0
-        for k in range(values.shape[1]):
-            size = abs(values[i, k])
-            found = size if size > found else found
-        most[i] = found
-    return float(most.max())
 
 
 @kernel

@@ -155,9 +155,9 @@ class Kernel(Generic[P, R]):
 
     def __call__(self, *args: P.args, **kwargs: P.kwargs) -> R:
         count = allowed_threads()
-        size = largest_size(args) if count > 1 else 0
-        if size < LARGE or self.parallel is self.serial:
-            return cast(R, self.serial(*args, **kwargs))
+        if count == 1 or largest_size(args) < LARGE or self.parallel is self.serial:
+            found: R = self.serial(*args, **kwargs)
+            return found
         with numba_threads(count) as free:
             version = self.parallel if free else self.serial
             return cast(R, version(*args, **kwargs))

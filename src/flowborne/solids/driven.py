@@ -62,6 +62,8 @@ def within_limits(driven: Driven, limit: Array, v_plus: Array, actuator: Array) 
     v_plus    (nv,) velocity of the solution
     actuator  (nv,) force of the drives in the solution, as `driven.actuator` returns it
     """
+    if not np.isfinite(limit).any():
+        return None
     over = driven.prescribed & (np.abs(actuator) > limit * (1.0 + LIMIT_TOLERANCE))
     past = driven.limited
     if past.any():

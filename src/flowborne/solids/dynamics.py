@@ -150,6 +150,8 @@ class System(ABC):
         if self.halfway is None:
             return self.own, True
         own, rounding = self.halfway.impulse(v_plus)
+        if own is self.own:
+            return own, True
         change = np.abs(own - self.own)
         larger = np.flatnonzero(~(change <= rounding))
 
@@ -168,18 +170,32 @@ class SolidSystem(System):
     smooth  (A, r) without the rows
     at      (nv,) velocity at which the zones were found
     turns   number of updates
+    known   (nv,) of the first r: forces but the applied ones, those of gravity and Coriolis with
+            the opposite sign, and the velocity for which these were made; None with constraint
+            rows, which depend on what is applied
     """
 
     A: Array
     smooth: tuple[Array, Array]
     at: Array
     turns: int = 0
+    known: tuple[Array, Array, Array] | None = None
+
+    def under(self, applied: Array) -> SolidSystem | None:
+        """The first system for another generalised force (nv,); None without `known`."""
+        if self.known is None or self.halfway is None:
+            return None
+        force, outer, guess = self.known
+        middle = self.halfway.under(force + applied + outer)
+        own, _ = middle.impulse(guess)
+        smooth = self.smooth[0], own
+        return replace(self, impulse=own, own=own, halfway=middle, smooth=smooth)
 
     def updated(self, v_plus: Array) -> SolidSystem | None:
         """As `System.updated`; after FULL_NEWTON_STEPS the zones are those at the minimum of the
         function between the last point and `v_plus`, so that the iteration does not cycle."""
         zones, at = self.zones_at(v_plus), v_plus
-        settled = np.array_equal(zones, self.zones)
+        settled = self.rows is None or np.array_equal(zones, self.zones)
         if self.rows is not None and not settled and self.turns >= FULL_NEWTON_STEPS:
             at = self._least_towards(v_plus, self.rows)
             zones = self.zones_at(at)
@@ -278,12 +294,15 @@ def assemble(
     A, force = _smooth(model, s, mass)
     rows, zones = rows_of(model, s)
     v, still = state.v.copy(), A @ state.v
-    middle, impulse = None, still + dt * force
+    middle, impulse, known = None, still + dt * force, None
     if before is not None:
+        guess = v if guess is None else guess
+        if rows is None:
+            known = s.data.qfrc_passive - s.bias, s.bias.copy(), guess
         middle = Halfway(model, s, before, state, dt, still, mass, force + s.bias)
-        impulse, _ = middle.impulse(v if guess is None else guess)
+        impulse, _ = middle.impulse(guess)
     full = _with_rows(A, impulse, v, dt, rows, zones)
-    return SolidSystem(*full, dt, v, rows, zones, middle, impulse, (A, impulse), v)
+    return SolidSystem(*full, dt, v, rows, zones, middle, impulse, (A, impulse), v, 0, known)
 
 
 def _smooth(model: SolidModel, s: Scratch, mass: Array) -> tuple[Array, Array]:

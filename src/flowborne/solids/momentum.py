@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from copy import copy
+
 import mujoco
 import numpy as np
 from scipy.sparse import csr_array
@@ -10,6 +12,9 @@ from flowborne.kernels.arrays import Array
 from flowborne.kernels.momentum import about_origin, momentum_impulse
 from flowborne.solids.model import SolidModel, SolidState
 from flowborne.solids.scratch import Scratch, posed, scratch, twists_about_origin
+
+Terms = tuple[Array, Array, Array]
+"""What the forces half-way to a velocity are made of; see `kernels.momentum`."""
 
 MOST_MOMENTA = 4
 """Half-way momenta of a model that a thread caches."""
@@ -129,17 +134,27 @@ class Halfway:
         self._twist = twists_about_origin(s.cdof, s.dof_centre())
         fall = dt * weight(model, s)
         self._given = subtree_halfway_momentum(model, s, before, dt) + fall
-        self._last: tuple[bytes, tuple[Array, Array]] | None = None
+        self._last: tuple[bytes, Terms, tuple[Array, Array]] | None = None
 
     def impulse(self, v_plus: Array) -> tuple[Array, Array]:
         """(nv,) r of A v+ = r with the forces half-way to `v_plus` (nv,), and (nv,) a bound of its
         rounding errors. The last result is cached; do not write to it."""
         key = v_plus.tobytes()
         if self._last is None or self._last[0] != key:
-            self._last = key, self._impulse(v_plus)
-        return self._last[1]
+            terms = self._terms(v_plus)
+            self._last = key, terms, self._sum(terms)
+        return self._last[2]
 
-    def _impulse(self, v_plus: Array) -> tuple[Array, Array]:
+    def under(self, outer: Array) -> Halfway:
+        """The same under other forces (nv,) than gravity and Coriolis forces."""
+        other = copy(self)
+        other._outer = outer
+        if self._last is not None:
+            key, terms, _ = self._last
+            other._last = key, terms, other._sum(terms)
+        return other
+
+    def _terms(self, v_plus: Array) -> Terms:
         model, dt, q, v = self._model, self._dt, self._state.q, self._state.v
         s = scratch(model)
         later = subtree_halfway_momentum(model, s, SolidState(q, v_plus), dt)
@@ -147,13 +162,9 @@ class Halfway:
         bias = np.empty(model.nv)
         mujoco.mj_rne(s.mj, s.data, 0, bias)
         gained = self._mass @ (v_plus - v) - model.armature * (v_plus - v)
-        return momentum_impulse(
-            self._twist,
-            (self._given, later, model.dof_body),
-            model.conserved,
-            gained,
-            self._still,
-            bias,
-            self._outer,
-            dt,
-        )
+        return later, gained, bias
+
+    def _sum(self, terms: Terms) -> tuple[Array, Array]:
+        model, (later, gained, bias) = self._model, terms
+        momenta, own = (self._given, later, model.dof_body), (gained, self._still, bias)
+        return momentum_impulse(self._twist, momenta, model.conserved, *own, self._outer, self._dt)

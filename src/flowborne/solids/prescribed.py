@@ -20,7 +20,14 @@ from scipy.linalg.lapack import dpotrf, dpotri
 from flowborne.base.errors import BreakdownError
 from flowborne.kernels.arrays import Array, Mask
 from flowborne.solids.dynamics import Kinematics, SolidSystem, System
-from flowborne.solvers.mobility import Answering, DenseAnswer, Drag, Mobility, dense_mobility
+from flowborne.solvers.mobility import (
+    Answering,
+    DenseAnswer,
+    Drag,
+    Mobility,
+    dense_mobility,
+    no_mobility,
+)
 
 
 @dataclass(frozen=True)
@@ -99,6 +106,11 @@ class PrescribedSystem(Driven):
     system: SolidSystem
     inverse: Array
 
+    def under(self, applied: Array) -> Self | None:
+        """As the step began, under another generalised force (nv,); None where it is made anew."""
+        system = self.system.under(applied)
+        return None if system is None else replace(self, system=system).solved()
+
     def answer(self, impulse: Array) -> Array:
         return np.asarray(self.inverse @ impulse)
 
@@ -108,6 +120,8 @@ class PrescribedSystem(Driven):
         return np.where(self.prescribed, needed, self.push)
 
     def mobility(self, pose: Kinematics) -> Mobility:
+        if not self.inverse.any():
+            return no_mobility(len(pose.twist_rows))
         return dense_mobility(self._response(pose))
 
     def answering(self, pose: Kinematics, drag: Drag) -> DenseAnswer:

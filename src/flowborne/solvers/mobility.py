@@ -9,6 +9,7 @@ unknowns that constraints hold. A drag D that grows with the velocity makes it N
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from scipy.sparse import csc_array, csr_array
@@ -64,6 +65,12 @@ def dense_mobility(matrix: Array) -> Mobility:
     blocks = none, none, few, none, few
     arrays = whole, start, few, np.zeros(0), np.zeros(0), blocks, none, np.zeros((0, 0))
     return Mobility(arrays, axes * np.sqrt(np.maximum(share, 0.0)))
+
+
+@cache
+def no_mobility(size: int) -> Mobility:
+    """That of bodies whose motion is given."""
+    return dense_mobility(np.zeros((size, size)))
 
 
 def factored_mobility(

@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 
 from flowborne.fluid.grid import Grid
-from flowborne.kernels.arrays import FREE, PERIODIC, PRESCRIBED, Array
+from flowborne.kernels.arrays import FREE, PRESCRIBED, Array
 
 Profile = Callable[[Array, Array, Array, float], tuple[Array, Array, Array]]
 """velocity(x, y, z, time) -> (u, v, w): broadcasting arrays in m and s to m/s."""
@@ -110,13 +110,6 @@ class Boundary:
         velocity.
         """
         return 0.0
-
-    def impose(self, field: Array, place: Place, time: float) -> None:
-        """Set the normal velocity on its faces, in place, if it is not free."""
-        if self.normal == PRESCRIBED:
-            field[place.layer] = self.prescribed_velocity(place, place.axis, time)
-        elif self.normal == PERIODIC and place.upper:
-            field[place.layer] = field[Place(place.grid, place.axis, upper=False).layer]
 
     def pressure_weight(self, place: Place) -> Array | float:
         """Acceleration of its faces by the pressure in the cells next to it, relative to that with
