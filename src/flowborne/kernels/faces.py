@@ -151,7 +151,6 @@ def weighted_sums(
 
 
 @kernel
-@kernel
 def is_finite(field: Array) -> bool:
     """Whether all values of a field are finite numbers."""
     values, wrong = flat(field), np.zeros(field.shape[0], np.int64)
