@@ -25,7 +25,7 @@ from flowborne.fluid.boundary import cells_in
 from flowborne.fluid.control_volumes import ControlVolumes, control_volumes
 from flowborne.fluid.dye import Dyed, Passage, carry_dye
 from flowborne.fluid.ghosts import edge, impose_sides
-from flowborne.fluid.grid import copied, faces_of
+from flowborne.fluid.grid import faces_of
 from flowborne.fluid.projection import accelerated
 from flowborne.fluid.transport import Transport, carry_component, damp_eddies
 from flowborne.kernels.arrays import PRESCRIBED, Array, Faces
@@ -137,7 +137,7 @@ def apply_body_force_and_sides(
     drives = [s for s in fluid.sources if s.velocity is not None and s.active(time)]
     if not drives and not any(fluid.body_force):
         return advected.velocity
-    velocity = copied(advected.velocity, grid)
+    velocity = faces_of([u.copy() for u in advected.velocity])
     if any(fluid.body_force):
         rates = accelerated(opened, advected.volumes.moving, density, grid, fluid.boundaries)
         for axis in grid.axes:
