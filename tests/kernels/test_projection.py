@@ -46,10 +46,11 @@ def test_outflow(shape: tuple[int, int, int]) -> None:
 @pytest.mark.parametrize("shape", SHAPES[:2])
 def test_open_outflow(shape: tuple[int, int, int]) -> None:
     velocity, opened, out = faces(shape, 0), faces(shape, 1), np.empty(shape)
-    rate = np.random.default_rng(2).standard_normal(shape)
+    rate, grid = np.random.default_rng(2).standard_normal(shape), Grid(shape, 0.1)
     if shape[2] == 1:  # no fluid moves across a slab
         velocity[2][:] = 0.0
-    open_outflow(out, tuple(opened), tuple(velocity), rate, 0.3)
+    fields = planes(tuple(opened), grid), planes(tuple(velocity), grid), plane(rate, grid)
+    open_outflow(plane(out, grid), *fields, 0.3)
     expected = 0.3 * outflow_reference(velocity, opened) - rate
     np.testing.assert_allclose(out, expected, atol=1e-14)
 

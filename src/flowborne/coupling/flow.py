@@ -25,7 +25,7 @@ from flowborne.fluid.boundary import cells_in
 from flowborne.fluid.control_volumes import ControlVolumes, control_volumes
 from flowborne.fluid.dye import Dyed, Passage, carry_dye
 from flowborne.fluid.ghosts import impose_sides, join_ends
-from flowborne.fluid.grid import copied, faces_of
+from flowborne.fluid.grid import faces_of
 from flowborne.fluid.projection import accelerated
 from flowborne.fluid.transport import Transport, carry_component, damp_eddies
 from flowborne.kernels.arrays import Array, Faces
@@ -145,7 +145,7 @@ def apply_body_force_and_sides(
     driven = [(cells_in(s, grid), u) for s, u in sources if u is not None]
     if not driven and not any(fluid.body_force):
         return advected.velocity
-    velocity = copied(advected.velocity, grid)
+    velocity = faces_of([u.copy() for u in advected.velocity])
     if any(fluid.body_force):
         rates = accelerated(opened, advected.volumes.moving, density, grid, fluid.boundaries)
         for axis in grid.axes:

@@ -41,6 +41,7 @@ from flowborne.coupling.report import Outcome, timed
 from flowborne.coupling.viscous_solve import diffuse
 from flowborne.coupling.world import World
 from flowborne.fluid.control_volumes import ControlVolumes
+from flowborne.fluid.ghosts import plane, planes
 from flowborne.fluid.grid import Grid
 from flowborne.fluid.projection import PressureGradient, face_weights
 from flowborne.kernels.arrays import ROUNDING, Array, Faces, Integers
@@ -187,8 +188,8 @@ def solve_together(
     given = world, velocity, volumes, gradient, cut, jets, pose
     smooth, viscous, smoothed = diffuse(*given, driven)
     term = LowRankTerm(cut.rows, mobility)
-    net, area = np.empty(fluid.grid.shape), fluid.grid.face_area
-    open_outflow(net, cut.open, smooth, rate, area)
+    grid, net = fluid.grid, np.empty(fluid.grid.shape)
+    net_outflow(net, smooth, cut, rate, grid)
     floor = rounding_floor(smooth, cut, boundary_velocity(pose, driven.velocity), fluid.grid)
     iterations, tried = 0, driven
     for _ in range(PASSES):
@@ -208,7 +209,7 @@ def solve_together(
             if not changed.same_mobility(driven):
                 term = replace(term, mobility=changed.mobility(pose))
                 smooth, viscous, smoothed = diffuse(*given, changed)
-                open_outflow(net, cut.open, smooth, rate, area)
+                net_outflow(net, smooth, cut, rate, grid)
             tried, driven = driven, changed
         tolerance = fluid.tolerance
         pressure = solution.pressure
@@ -228,7 +229,7 @@ def solve_together(
         change = boundary_velocity(pose, v - driven.system.v)
     if world.setup.balances:
         moved = start + term.mobility.times(on_solids)
-        open_outflow(net, cut.open, after, rate, area)
+        net_outflow(net, after, cut, rate, grid)
         add_flux(net, cut, moved)
         divergence = float(max(net.max(), -net.min())) / fluid.grid.cell_volume
         fastest = max(largest_open(after[axis], cut.open[axis], 0.0) for axis in fluid.grid.axes)
@@ -329,6 +330,12 @@ def give_way(cut: Geometry, mobility: Mobility, grid: Grid) -> Array:
         room.flat[cells] += field.flat[cells] * moved.flat[cells] / PROBES
     room.flat[cells] = np.maximum(room.flat[cells], 0.0)
     return room
+
+
+def net_outflow(net: Array, velocity: Faces, cut: Geometry, rate: Array, grid: Grid) -> None:
+    """Net outflow of each cell through open faces less `rate`, D u - sources, m^3/s, in `net`."""
+    fields = planes(cut.open, grid), planes(velocity, grid), plane(rate, grid)
+    open_outflow(plane(net, grid), *fields, grid.face_area)
 
 
 def rounding_floor(velocity: Faces, cut: Geometry, moving: Array, grid: Grid) -> float:

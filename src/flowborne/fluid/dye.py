@@ -24,7 +24,16 @@ from flowborne.fluid.sides.side import Place
 from flowborne.fluid.transport import SUBSTEPS, Transport, parts_for
 from flowborne.kernels.arrays import Array, Integers, Marks
 from flowborne.kernels.control_volumes import mark_cut
-from flowborne.kernels.dye import CUT, WHOLE, CutCells, list_flows, pass_on, sort_cells, sweep
+from flowborne.kernels.dye import (
+    CUT,
+    WHOLE,
+    Bounds,
+    CutCells,
+    list_flows,
+    pass_on,
+    sort_cells,
+    sweep,
+)
 
 REACH = 2
 """Cells on both sides that the parabola in a cell is made from."""
@@ -116,7 +125,7 @@ class Passage:
             list_flows(self.cut, axis, transport.flux[axis], wraps, shape)
         self.expelled = np.searchsorted(listed, brought.cells)
 
-    def carry(self, name: str, values: Array, bounds: tuple[float, float]) -> tuple[Array, float]:
+    def carry(self, name: str, values: Array, bounds: Bounds) -> tuple[Array, float]:
         """A scalar a step later, and the amount that came in through sides, mouths and sources.
 
         bounds  least and largest value that it may take
@@ -130,7 +139,7 @@ class Passage:
             order = self.grid.axes if (s % 2 == 0) != self.backwards else self.grid.axes[::-1]
             box = self.reached(name, field)
             for axis in order:
-                gained += self.carry_along(axis, name, field, volume, box, bounds)
+                gained += self.carry_along(axis, name, (field, volume), box, bounds)
         return field, gained
 
     def reached(self, name: str, field: Array) -> Box:
@@ -148,16 +157,10 @@ class Passage:
         return box[0], box[1], box[2]
 
     def carry_along(
-        self,
-        axis: int,
-        name: str,
-        field: Array,
-        volume: Array,
-        box: Box,
-        bounds: tuple[float, float],
+        self, axis: int, name: str, fields: tuple[Array, Array], box: Box, bounds: Bounds
     ) -> float:
-        """Carry a scalar along an axis in a box, in place; gives what came in."""
-        grid, own, faces = self.grid, box[axis], list(box)
+        """Carry a scalar along an axis in a box, in place, with the volumes; gives what came in."""
+        grid, own, faces, field = self.grid, box[axis], list(box), fields[0]
         faces[axis] = slice(own.start, own.stop + 1)
         flux, marks = self.transport.flux[axis][tuple(faces)], along(self.clear[box], axis, grid)
         within = own.start > 0, own.stop < grid.shape[axis]  # nothing comes in at such an end
@@ -165,11 +168,12 @@ class Passage:
         ends = np.stack([self.beyond(name, field, axis, upper)[others] for upper in (0, 1)])
         ends[np.array(within)] = 0.0
         ring = self.sides.periodic()[axis] and not any(within)
-        values, room, through = (along(f, axis, grid) for f in (field[box], volume[box], flux))
-        crossed = sweep(values, room, through, marks, ends, ring, self.dt, bounds)
+        values, room = (along(f[box], axis, grid) for f in fields)
+        flow = along(flux, axis, grid)
+        crossed = sweep(values, room, flow, marks, ends, ring, self.dt, bounds)
         return float(crossed[0].sum() - crossed[1].sum())
 
-    def bounds(self, name: str, values: Array) -> tuple[float, float]:
+    def bounds(self, name: str, values: Array) -> Bounds:
         """Least and largest value that there is or comes in."""
         found = [values]
         for axis in self.grid.axes:
@@ -189,7 +193,7 @@ class Passage:
         values = (layer if given is None else np.broadcast_to(given, layer.shape))[edge(axis, 0)]
         return values.T if self.grid.is_slab else values
 
-    def pass_on(self, name: str, field: Array, volume: Array, bounds: tuple[float, float]) -> float:
+    def pass_on(self, name: str, field: Array, volume: Array, bounds: Bounds) -> float:
         """Carry a scalar through the faces of the cut cells, in place; gives what came in."""
         listed, n, dt = self.cut.listed, self.cut.listed.size, self.dt
         entering, gain, dye = np.zeros((n, 6)), np.zeros(n), np.zeros(n)

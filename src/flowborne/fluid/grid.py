@@ -26,11 +26,6 @@ def inner_product(a: Array, b: Array) -> float:
     return float(np.einsum("ijk,ijk->", a, b))
 
 
-def copied(faces: Faces, grid: Grid) -> Faces:
-    """A copy; what does not flow, across a slab, is the same."""
-    return faces_of([faces[n].copy() if n in grid.axes else faces[n] for n in range(3)])
-
-
 def extent(marks: Mask | Marks, axis: int) -> tuple[int, int]:
     """First layer across an axis of three in which something is marked, and the one after the last;
     (0, 0) where nothing is."""

@@ -30,6 +30,16 @@ def net_out(out: Array, qx: Array, qy: Array, qz: Array) -> None:
                 out[i, j, k] = total + qz[i, j, k + 1] - qz[i, j, k]
 
 
+@inlined
+def surplus(flux: Faces, volumes: Volumes, i: int, j: int, k: int, dt: float) -> float:
+    """Volume per time by which fluxes fill a cell too much; see `mark_unsettled`."""
+    (start, rate, _, end), (qx, qy, qz) = volumes, flux
+    deep = qx.shape[0] - start.shape[0]
+    net = qx[i + deep, j, k] - qx[i, j, k] + qy[i, j + 1, k] - qy[i, j, k]
+    net += qz[i, j, k + 1] - qz[i, j, k]
+    return (start[i, j, k] - end[i, j, k]) / dt + rate[i, j, k] - net
+
+
 @kernel
 def mark_unsettled(
     marks: Marks, volumes: Volumes, flux: Faces, dt: float, cell: float, slack: float
@@ -41,26 +51,13 @@ def mark_unsettled(
     cell     volume of a whole cell
     slack    by which the volume after dt may differ from that of the cut
     """
-    (start, rate, before, end), (qx, qy, qz) = volumes, flux
-    deep = qx.shape[0] - start.shape[0]
-    for i in prange(start.shape[0]):
-        for j in range(start.shape[1]):
-            for k in range(start.shape[2]):
-                net = qx[i + deep, j, k] - qx[i, j, k] + qy[i, j + 1, k] - qy[i, j, k]
-                net += qz[i, j, k + 1] - qz[i, j, k]
-                left = start[i, j, k] + dt * (rate[i, j, k] - net) - end[i, j, k]
+    before, end = volumes[2:]
+    for i in prange(marks.shape[0]):
+        for j in range(marks.shape[1]):
+            for k in range(marks.shape[2]):
                 cut = min(before[i, j, k], end[i, j, k]) < cell
-                marks[i, j, k] = cut or not abs(left) <= slack
-
-
-@inlined
-def surplus(flux: Faces, volumes: Volumes, i: int, j: int, k: int, dt: float) -> float:
-    """Volume per time by which fluxes fill a cell too much; see `mark_unsettled`."""
-    (start, rate, _, end), (qx, qy, qz) = volumes, flux
-    deep = qx.shape[0] - start.shape[0]
-    net = qx[i + deep, j, k] - qx[i, j, k] + qy[i, j + 1, k] - qy[i, j, k]
-    net += qz[i, j, k + 1] - qz[i, j, k]
-    return (start[i, j, k] - end[i, j, k]) / dt + rate[i, j, k] - net
+                filled = dt * abs(surplus(flux, volumes, i, j, k, dt)) <= slack
+                marks[i, j, k] = cut or not filled
 
 
 @kernel
@@ -106,24 +103,14 @@ def push(fields: Fields, i: int, j: int, k: int, scale: float, difference: float
 @kernel
 def open_outflow(out: Array, opened: Faces, velocity: Faces, rate: Array, area: float) -> None:
     """Net volume that leaves each cell per time through open parts of its faces, less `rate`."""
-    a0, a1, a2 = opened
-    u0, u1, u2 = velocity
-    net, less = out, rate
-    d = int(out.shape[2] > 1)
-    if not d:  # a slab's rows along y
-        n0, n1 = out.shape[0], out.shape[1]
-        net, less = out.reshape((1, n0, n1)), rate.reshape((1, n0, n1))
-        a1, a2 = a0.reshape((1, n0 + 1, n1)), a1.reshape((1, n0, n1 + 1))
-        u1, u2 = u0.reshape((1, n0 + 1, n1)), u1.reshape((1, n0, n1 + 1))
-    for i in prange(net.shape[0]):
-        for j in range(net.shape[1]):
-            for k in range(net.shape[2]):
-                total = 0.0
-                if d:
-                    total = a0[i + 1, j, k] * u0[i + 1, j, k] - a0[i, j, k] * u0[i, j, k]
+    (a0, a1, a2), (u0, u1, u2), deep = opened, velocity, opened[0].shape[0] - out.shape[0]
+    for i in prange(out.shape[0]):
+        for j in range(out.shape[1]):
+            for k in range(out.shape[2]):
+                total = a0[i + deep, j, k] * u0[i + deep, j, k] - a0[i, j, k] * u0[i, j, k]
                 total = total + a1[i, j + 1, k] * u1[i, j + 1, k] - a1[i, j, k] * u1[i, j, k]
                 total = total + a2[i, j, k + 1] * u2[i, j, k + 1] - a2[i, j, k] * u2[i, j, k]
-                net[i, j, k] = total * area - less[i, j, k]
+                out[i, j, k] = total * area - rate[i, j, k]
 
 
 @kernel
