@@ -53,9 +53,10 @@ from flowborne.solvers.pressure import NO_REACTION, NO_TERM, LowRankTerm, Pressu
 PASSES = 50
 """Most times that contacts, torque limits and Coriolis forces are corrected in one step."""
 
-TIGHTENING = 1e-3
-"""Relative residual of the first of several solves of one step, and tolerance of each later one
-over that of the one before: what a correction changes shrinks as fast."""
+ROUGH = 1e-3
+"""Relative residual of the first of several solves of one step, whose bodies are corrected anyway.
+The next has the full tolerance, and those after it go on from there: their corrections are small.
+"""
 
 SPLIT_TOLERANCE = 1e-3
 """Relative residual of the added-mass part of the pressure, whose forces are then off by 2e-4 at
@@ -180,7 +181,7 @@ def solve_together(
     pressure = dt * state.pressure
     tolerance = fluid.tolerance
     if changes_under(pressure, cut, pose, driven, torque_limit):
-        tolerance = max(tolerance, TIGHTENING)
+        tolerance = max(tolerance, ROUGH)
     rate = source_rate(fluid, world.time + dt, cut.open)
     add_rates(rate, jets)
     smooth, viscous, smoothed = diffuse(world, velocity, mass, gradient, cut, jets, pose, driven)
@@ -209,7 +210,7 @@ def solve_together(
                 )
                 net = net_outflow(smooth, cut, rate, fluid)
             tried, driven = driven, changed
-        tolerance = max(fluid.tolerance, TIGHTENING * tolerance)
+        tolerance = fluid.tolerance
         pressure = solution.pressure
     after = copied(smooth, fluid.grid)
     gradient.subtract(after, solution.pressure, 1.0)
