@@ -59,10 +59,8 @@ def skins_on(
         return Skins((), np.zeros((0, 3)), vertices, np.zeros((0, 3), np.int64))
     thinnest = 2.0 * WATERTIGHT[grid.is_slab] * grid.spacing
     pieces, middles = [], []
-    for f in range(len(flesh.names)):
-        own = np.flatnonzero(flesh.of_surface == f)
-        triangles = flesh.surface[own]
-        inside = vertices[np.unique(triangles)]
+    for f, triangles in enumerate(flesh.skins):
+        inside = vertices[flesh.outer[f]]
         low, high = inside.min(axis=0), inside.max(axis=0)
         middles.append(0.5 * (low + high))
         more = max(0.0, 0.5 * (thinnest - flesh.thickness[f]))
@@ -75,7 +73,7 @@ def skins_on(
             phi = sample_skin(vertices, triangles, box, image.nodes, BAND)
             found = new_crossings(phi, grid.spacing, grid.is_slab)
             if more == 0.0:
-                skin = vertices, triangles, (-1 - f) * PIECES + flesh.sheets[own]
+                skin = vertices, triangles, (-1 - f) * PIECES + flesh.sheets[flesh.of_surface == f]
                 cross_skin(found, np.zeros(1, np.int64), phi, *skin, box, image.nodes)
             pieces.append(piece_of(bodies + f, grid, box, phi - more, found))
     return Skins(tuple(pieces), np.array(middles), vertices, flesh.surface)

@@ -185,8 +185,11 @@ def singular_values(F: Array, U: Array, V: Array, sigma: Array) -> None:
         sigma[:] = 0.0
         U[:] = V
         return
-    U[:, 0] /= sigma[0]
-    U[:, 1] -= (U[0, 0] * U[0, 1] + U[1, 0] * U[1, 1] + U[2, 0] * U[2, 1]) * U[:, 0]
+    for i in range(3):
+        U[i, 0] /= sigma[0]
+    share = U[0, 0] * U[0, 1] + U[1, 0] * U[1, 1] + U[2, 0] * U[2, 1]
+    for i in range(3):
+        U[i, 1] -= share * U[i, 0]
     sigma[1] = np.sqrt(U[0, 1] ** 2 + U[1, 1] ** 2 + U[2, 1] ** 2)
     if sigma[1] <= 1e-12 * sigma[0]:
         k = int(np.argmin(np.abs(U[:, 0])))
@@ -194,7 +197,8 @@ def singular_values(F: Array, U: Array, V: Array, sigma: Array) -> None:
         U[k, 1] += 1.0
         U[:, 1] /= np.sqrt(U[0, 1] ** 2 + U[1, 1] ** 2 + U[2, 1] ** 2)
     else:
-        U[:, 1] /= sigma[1]
+        for i in range(3):
+            U[i, 1] /= sigma[1]
     x, y, z = U[0, 2], U[1, 2], U[2, 2]
     U[0, 2] = U[1, 0] * U[2, 1] - U[2, 0] * U[1, 1]
     U[1, 2] = U[2, 0] * U[0, 1] - U[0, 0] * U[2, 1]
@@ -233,12 +237,11 @@ def principal_moduli(sigma: Array, mu: float, lame: float, law: int, H: Array, R
                 R[i, j], R[j, i] = 0.5 * (shear + turn), 0.5 * (shear - turn)
     axes = np.empty((3, 3))
     diagonalise(H, axes)
-    share = np.array([max(H[0, 0], 0.0), max(H[1, 1], 0.0), max(H[2, 2], 0.0)])
+    x, y, z = max(H[0, 0], 0.0), max(H[1, 1], 0.0), max(H[2, 2], 0.0)
     for i in range(3):
         for j in range(3):
-            H[i, j] = 0.0
-            for k in range(3):
-                H[i, j] += axes[i, k] * share[k] * axes[j, k]
+            first, second = axes[i, 0] * x * axes[j, 0], axes[i, 1] * y * axes[j, 1]
+            H[i, j] = first + second + axes[i, 2] * z * axes[j, 2]
 
 
 @kernel

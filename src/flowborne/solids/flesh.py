@@ -154,10 +154,15 @@ class Flesh:
         """(k,) smooth sheet at rest of each triangle of the surface."""
         return smooth_sheets(self.rest, self.surface)
 
-    @property
+    @cached_property
     def skins(self) -> list[Integers]:
         """(m, 3) triangles of each flesh, outward."""
         return [self.surface[self.of_surface == f] for f in range(len(self.names))]
+
+    @cached_property
+    def outer(self) -> list[Integers]:
+        """(k,) vertices of each skin."""
+        return [np.unique(skin) for skin in self.skins]
 
     @cached_property
     def volumes(self) -> Array:

@@ -78,6 +78,8 @@ class PrescribedFlesh(Driven):
         return change
 
     def actuator(self, v_plus: Array, impulse: Array) -> Array:
+        if not self.prescribed.any():
+            return self.push
         left = _remaining(self.system, v_plus) + impulse
         return np.where(self.prescribed, -left / self.system.dt, self.push)
 
