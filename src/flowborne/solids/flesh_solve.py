@@ -158,7 +158,8 @@ def _damped(system: FleshSystem, free: Integers, factor: Cholesky) -> FleshSyste
 def _remaining(system: FleshSystem, v_plus: Array) -> Array:
     """(nv,) r - B v+."""
     J, D, push = system.acting()
-    return np.asarray(system.impulse + push - system.A @ v_plus - J.T @ (D * (J @ v_plus)))
+    left = system.impulse + push
+    return left - system.A @ v_plus - J.T @ (D * (J @ v_plus)) if v_plus.any() else left
 
 
 def _solve(factor: Cholesky, rows: tuple[Array, Any], right: Array) -> Array:
