@@ -12,7 +12,6 @@ from flowborne.kernels.edge_crossings import new_crossings
 from flowborne.kernels.viscosity import (
     GIVEN,
     INACTIVE,
-    TIED,
     UNKNOWN,
     CutFaces,
     apply_component,
@@ -49,7 +48,7 @@ def kinds(shape: tuple[int, int, int], normal: np.ndarray, axis: int) -> tuple:
     """The cut grid, centres, open parts of the cells and kinds; some open faces inside are
     prescribed."""
     made = cut(shape)
-    kind = classify_reference(made.opened[axis], axis, normal, 0.3)
+    kind = classify_reference(made.opened[axis], axis, normal)
     random = np.random.default_rng(1)
     kind[(kind == UNKNOWN) & (random.random(kind.shape) < 0.1)] = GIVEN
     parts = random.random(shape) * (random.random(shape) < 0.9)
@@ -63,9 +62,9 @@ def test_distances_and_kinds(shape: tuple, normal: np.ndarray, axis: int) -> Non
     face_distances(made.distance, axis, phi)
     np.testing.assert_allclose(phi, face_distances_reference(made.distance, axis), atol=1e-15)
     kind = np.empty(phi.shape, np.uint8)
-    classify(kind, made.opened[axis], axis, normal, 0.3)
-    expected = classify_reference(made.opened[axis], axis, normal, 0.3)
-    assert {INACTIVE, UNKNOWN, TIED} <= set(np.unique(expected))
+    classify(kind, made.opened[axis], axis, normal)
+    expected = classify_reference(made.opened[axis], axis, normal)
+    assert {INACTIVE, UNKNOWN} <= set(np.unique(expected))
     np.testing.assert_array_equal(kind, expected)
 
 

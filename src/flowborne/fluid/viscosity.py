@@ -35,7 +35,6 @@ import numpy as np
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.grid import Grid
 from flowborne.kernels.arrays import PRESCRIBED, Array, Faces, Integers, Marks
-from flowborne.kernels.control_volumes import CLOSED_BELOW
 from flowborne.kernels.corner_friction import corner_stiffness, find_corners
 from flowborne.kernels.edge_crossings import Crossings
 from flowborne.kernels.viscosity import (
@@ -75,7 +74,7 @@ class ViscousFaces:
     """The viscous system of the faces across one axis; arrays have the shape of the faces.
 
     first     position of the component among the concatenated faces
-    kind      INACTIVE, UNKNOWN, GIVEN or TIED
+    kind      INACTIVE, UNKNOWN or GIVEN
     mass      m / dt, kg/s; see SIDE_MASS
     diagonal  m / dt + sum of links + W of unknowns, else 0, kg/s
     links     (3, ...) k to the next face along each axis, between unknowns, kg/s
@@ -152,7 +151,7 @@ def assemble_viscosity(
         kind, away = np.empty(shape, np.uint8), np.empty(shape)
         face_distances(cut.distance, axis, away)
         away -= NEAR * h
-        classify(kind, opened, axis, normal, CLOSED_BELOW)
+        classify(kind, opened, axis, normal)
         near = np.flatnonzero((kind != INACTIVE) & (away <= 0.0))
         centre = np.zeros((2, *shape))
         find_centres(*edges, axis, near, centre, grid.is_slab)

@@ -26,6 +26,9 @@ from flowborne.kernels.jit import inlined
 
 Index = tuple[int, int, int]
 
+CLOSED_BELOW = 1e-9
+"""Open part of a face below which it is closed."""
+
 CREASE = 0.02
 """Open part below which a face in a crease is closed. Bodies that overlap at a joint, or reach into
 a side of the domain, press a cell that they never press in truth: what it has to lose would leave
@@ -145,7 +148,7 @@ def share_closed(
                 if own != all_own:
                     union = closed_part(centre, (a, b, c), distance, found, axis, (i, j, k), flat)
                 if union > 1.0 - CREASE and (
-                    union > 1.0 - 1e-9 or in_a_crease(beside, axis, i, j, k, ring)
+                    union > 1.0 - CLOSED_BELOW or in_a_crease(beside, axis, i, j, k, ring)
                 ):
                     union = 1.0
                     centre[:, a, b, c] = 0.0

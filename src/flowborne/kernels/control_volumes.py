@@ -27,9 +27,6 @@ from flowborne.kernels.jit import inlined, kernel
 AHEAD = 16
 """Places that a list is gone through before it is searched."""
 
-CLOSED_BELOW = 1e-9
-"""Open part of a face up to which it counts as closed."""
-
 DRIVEN, PART, SHUT, UNEVEN, LISTED = 1, 2, 4, 8, 16
 """Kinds of faces: pressure acts on it; its control volume is not whole; pressure does not act on
 it, and it has one; its control volume is not what its opening says; it is in a list."""
@@ -417,7 +414,7 @@ def kind_of(
     goal   what it would move if it were open
     own    whether its velocity is not prescribed, and it is not another one
     """
-    pushed = own and opened > CLOSED_BELOW and volume > nothing
+    pushed = own and opened > 0.0 and volume > nothing
     shut = own and not pushed and volume != 0.0
     uneven = pushed and abs(volume - goal * opened) > slack
     return DRIVEN * pushed + PART * (volume < least) + SHUT * shut + UNEVEN * uneven

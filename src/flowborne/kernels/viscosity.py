@@ -18,8 +18,8 @@ from flowborne.kernels.cut_faces import closed_face, open_edge, other_axes
 from flowborne.kernels.edge_crossings import Crossings
 from flowborne.kernels.jit import inlined, kernel
 
-INACTIVE, UNKNOWN, GIVEN, TIED = range(4)
-"""A face is inside a body, solved for, prescribed by a side, or moves with the body beside it."""
+INACTIVE, UNKNOWN, GIVEN = range(3)
+"""A face is inside a body, solved for, or prescribed by a side."""
 
 LEAST = 1e-3
 """Least distance from a wall and between two faces, and least open part of a cell over that of its
@@ -35,7 +35,7 @@ class CutFaces(NamedTuple):
     """The faces across one axis, and what bodies leave open around them.
 
     axis       that
-    kind       INACTIVE, UNKNOWN, GIVEN or TIED
+    kind       INACTIVE, UNKNOWN or GIVEN
     distance   to the bodies at the nodes, m
     crossings  of edges with them
     opened     open part of each face
@@ -71,7 +71,7 @@ def face_distances(distance: Array, axis: int, out: Array) -> None:
 
 
 @kernel
-def classify(kind: Marks, opened: Array, axis: int, normal: Integers, touching: float) -> None:
+def classify(kind: Marks, opened: Array, axis: int, normal: Integers) -> None:
     """Kind of every face across `axis` from its open part.
 
     normal  (3, 2) a of the velocity across the sides, see `fluid.sides.side`
@@ -90,8 +90,6 @@ def classify(kind: Marks, opened: Array, axis: int, normal: Integers, touching: 
                     kind[i, j, k] = GIVEN
                 elif at == last and normal[axis, 1] == PERIODIC:
                     kind[i, j, k] = INACTIVE
-                elif opened[i, j, k] <= touching:
-                    kind[i, j, k] = TIED
 
 
 @kernel

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from flowborne.kernels.arrays import PERIODIC, PRESCRIBED, Array, Integers, Pixels
-from flowborne.kernels.viscosity import GIVEN, INACTIVE, LEAST, SAME, TIED, UNKNOWN
+from flowborne.kernels.viscosity import GIVEN, INACTIVE, LEAST, SAME, UNKNOWN
 
 from .cut_faces import closed_polygon_reference, open_edge_reference
 
@@ -20,9 +20,9 @@ def face_distances_reference(distance: Array, axis: int) -> Array:
     return np.moveaxis(mean, 0, axis)
 
 
-def classify_reference(opened: Array, axis: int, normal: Integers, touching: float) -> Pixels:
+def classify_reference(opened: Array, axis: int, normal: Integers) -> Pixels:
     """`classify` in NumPy: the kinds."""
-    kind = np.where(opened <= touching, TIED, UNKNOWN).astype(np.uint8)
+    kind = np.full(opened.shape, UNKNOWN, np.uint8)
     ends = np.moveaxis(kind, axis, 0)
     if normal[axis, 0] == PRESCRIBED:
         ends[0] = GIVEN
