@@ -12,7 +12,6 @@ import numpy as np
 from numba import njit
 
 from flowborne.kernels.arrays import PERIODIC, PRESCRIBED, Array, Faces, Integers, Nodes
-from flowborne.kernels.control_volumes import across_axis
 from flowborne.kernels.cut_faces import (
     closed_face,
     crossing_from,
@@ -60,7 +59,7 @@ class Piece(NamedTuple):
 def close_faces(piece: Piece, total: Array, axis: int) -> None:
     """What one body alone closes of each face across `axis` in its box, in place; added to `total`,
     too."""
-    own, centre = across_axis(piece.share, axis), across_axis(piece.centre, axis)
+    own, centre = piece.share[axis], piece.centre[axis]
     box, flat, phi, found = piece.box, piece.nodes.flat, piece.distance, piece.crossings
     for i in range(own.shape[0]):
         for j in range(own.shape[1]):
@@ -132,7 +131,7 @@ def share_closed(
               the body, decides what crosses
     returns   (n,) flat indices of the faces, (n,) its parts, and (n, 2) their centres
     """
-    share, centre = across_axis(piece.share, axis), across_axis(piece.centre, axis)
+    share, centre = piece.share[axis], piece.centre[axis]
     box, flat, count = piece.box, piece.nodes.flat, 0
     most, (_, nj, nk) = np.count_nonzero(share), opened.shape
     faces, part, middle = np.empty(most, np.int64), np.empty(most), np.empty((most, 2))

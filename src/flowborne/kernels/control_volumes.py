@@ -11,16 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit, prange
 
-from flowborne.kernels.arrays import (
-    PERIODIC,
-    PRESCRIBED,
-    Array,
-    FaceGrid,
-    Faces,
-    Integers,
-    Marks,
-    Three,
-)
+from flowborne.kernels.arrays import PERIODIC, PRESCRIBED, Array, FaceGrid, Integers, Marks, Three
 from flowborne.kernels.faces import mean_row
 from flowborne.kernels.jit import inlined, kernel
 
@@ -55,14 +46,6 @@ class Transfers(NamedTuple):
     givers: Integers
     takers: Integers
     volume: Array
-
-
-@njit(nogil=True, cache=True)
-def across_axis(faces: Faces, axis: int) -> Array:
-    """The field of the faces across an axis."""
-    if axis == 0:
-        return faces[0]
-    return faces[1] if axis == 1 else faces[2]
 
 
 @inlined

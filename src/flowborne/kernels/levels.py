@@ -40,8 +40,9 @@ from flowborne.kernels.arrays import (
     Triple,
 )
 from flowborne.kernels.even import ROUNDING, SINGLE, find_even
+from flowborne.kernels.faces import largest_size
 from flowborne.kernels.jit import kernel
-from flowborne.kernels.vectors import largest, scaled
+from flowborne.kernels.vectors import scaled
 
 
 @kernel
@@ -155,22 +156,17 @@ def orphans_at(orphans: Indices, table: Integers, level: int) -> Indices:
 @kernel
 def wrap_ghosts(x: NDArray[Any], periodic: Periodic) -> None:
     """Copy the values at each end of a periodic axis to the ghosts at the other end."""
-    p0, p1, p2 = x.shape
-    if periodic[0] and p0 > 1:
-        for j in range(p1):
-            for k in range(p2):
-                x[0, j, k] = x[p0 - 2, j, k]
-                x[p0 - 1, j, k] = x[1, j, k]
-    if periodic[1]:
-        for i in range(p0):
-            for k in range(p2):
-                x[i, 0, k] = x[i, p1 - 2, k]
-                x[i, p1 - 1, k] = x[i, 1, k]
-    if periodic[2]:
-        for i in range(p0):
-            for j in range(p1):
-                x[i, j, 0] = x[i, j, p2 - 2]
-                x[i, j, p2 - 1] = x[i, j, 1]
+    flat, shape, stride = x.reshape(-1), x.shape, (x.shape[1] * x.shape[2], x.shape[2], 1)
+    for axis in range(3):
+        n, step = shape[axis] - 2, stride[axis]
+        if not periodic[axis] or n < 1:
+            continue
+        one, other = int(axis == 0), 2 - int(axis == 2)
+        for a in range(shape[one]):
+            for b in range(shape[other]):
+                at = a * stride[one] + b * stride[other]
+                flat[at] = flat[at + n * step]
+                flat[at + (n + 1) * step] = flat[at + step]
 
 
 @kernel
@@ -383,7 +379,7 @@ def fill_levels(
     table, periodic, weights, even = hierarchy[0], hierarchy[1], hierarchy[2], hierarchy[5]
     w0, w1, w2, diagonal = finest
     finest_weights(faces, (w0, w1, w2), diagonal)
-    most = largest(diagonal)
+    most = largest_size(diagonal)
     scale = 1.0 / most if most > 0.0 else 1.0
     for source, target in ((w0, weights[0]), (w1, weights[1]), (w2, weights[2])):
         scaled(source, target[: source.size], scale)

@@ -13,15 +13,6 @@ from flowborne.kernels.jit import inlined, kernel
 
 
 @kernel
-def largest(values: Array) -> float:
-    """Largest value of an array, at least 0."""
-    found = 0.0
-    for value in values.flat:
-        found = max(found, value)
-    return found
-
-
-@kernel
 def scaled(source: Real, target: Real, scale: float) -> None:
     """target = scale x source, in target's precision."""
     a, b = source.reshape(-1), target.reshape(-1)
