@@ -37,6 +37,7 @@ from flowborne.fluid.grid import Grid
 from flowborne.kernels.arrays import PRESCRIBED, Array, Faces, Integers, Marks
 from flowborne.kernels.corner_friction import corner_stiffness, find_corners
 from flowborne.kernels.edge_crossings import Crossings
+from flowborne.kernels.node_distance import NEAR
 from flowborne.kernels.viscosity import (
     INACTIVE,
     UNKNOWN,
@@ -47,9 +48,6 @@ from flowborne.kernels.viscosity import (
     link_faces,
     meet_walls,
 )
-
-NEAR = 2.0
-"""Mean distance of a face's corners from bodies beyond which it is not beside one, cells."""
 
 SIDE_MASS = 0.75
 """Part of the mass of the faces along a side with friction that this slows down: what

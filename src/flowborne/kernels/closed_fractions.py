@@ -13,6 +13,7 @@ from numba import njit
 
 from flowborne.kernels.arrays import PERIODIC, PRESCRIBED, Array, Faces, Integers, Nodes
 from flowborne.kernels.cut_faces import (
+    SAME,
     closed_face,
     crossing_from,
     is_cut,
@@ -24,9 +25,6 @@ from flowborne.kernels.edge_crossings import Crossings
 from flowborne.kernels.jit import inlined
 
 Index = tuple[int, int, int]
-
-CLOSED_BELOW = 1e-9
-"""Open part of a face below which it is closed."""
 
 CREASE = 0.02
 """Open part below which a face in a crease is closed. Bodies that overlap at a joint, or reach into
@@ -147,7 +145,7 @@ def share_closed(
                 if own != all_own:
                     union = closed_part(centre, (a, b, c), distance, found, axis, (i, j, k), flat)
                 if union > 1.0 - CREASE and (
-                    union > 1.0 - CLOSED_BELOW or in_a_crease(beside, axis, i, j, k, ring)
+                    union > 1.0 - SAME or in_a_crease(beside, axis, i, j, k, ring)
                 ):
                     union = 1.0
                     centre[:, a, b, c] = 0.0

@@ -12,8 +12,8 @@ BAND = 4.0
 """Distances are known up to this many cells from a body; beyond, they are this large."""
 
 NEAR = 1.75
-"""Distance up to which skins are exact, and curvature is allowed for, cells: the diagonal of a
-cell."""
+"""Distance up to which skins are exact, curvature is allowed for, and faces are beside a body,
+cells: the diagonal of a cell."""
 
 
 @njit(nogil=True, cache=True)

@@ -14,7 +14,7 @@ from numba import njit, prange
 
 from flowborne.kernels.arrays import PERIODIC, PRESCRIBED, Array, Integers, Marks
 from flowborne.kernels.control_volumes import indices
-from flowborne.kernels.cut_faces import closed_face, open_edge, other_axes
+from flowborne.kernels.cut_faces import SAME, closed_face, open_edge, other_axes
 from flowborne.kernels.edge_crossings import Crossings
 from flowborne.kernels.jit import inlined, kernel
 
@@ -26,9 +26,6 @@ LEAST = 1e-3
 faces: bounds friction where they are smaller."""
 
 Index = tuple[int, int, int]
-
-SAME = 1e-12
-"""Open parts of two faces that differ by less are the same."""
 
 
 class CutFaces(NamedTuple):

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from flowborne.kernels.arrays import PERIODIC, PRESCRIBED, Array, Integers, Pixels
-from flowborne.kernels.viscosity import GIVEN, INACTIVE, LEAST, SAME, UNKNOWN
+from flowborne.kernels.cut_faces import SAME
+from flowborne.kernels.viscosity import GIVEN, INACTIVE, LEAST, UNKNOWN
 
 from .cut_faces import closed_polygon_reference, open_edge_reference
 
