@@ -12,7 +12,7 @@ from flowborne.coupling.fractions import Geometry
 from flowborne.coupling.viscous_solve import TOLERANCE, ViscousSystem, walls_of
 from flowborne.fluid.ghosts import edge
 from flowborne.fluid.viscosity import OpenParts, assemble_viscosity
-from flowborne.kernels.viscosity import TIED, UNKNOWN
+from flowborne.kernels.viscosity import UNKNOWN
 from flowborne.solvers.conjugate_gradients import spread
 from flowborne.solvers.mobility import DenseAnswer
 from flowborne.worlds import Boundaries, BoundaryNoSlip, cut_by_bodies, faces_of, make_world
@@ -46,11 +46,10 @@ class Case:
     system: ViscousSystem
 
     def mass(self) -> Faces:
-        """Mass of the unknown and the tied faces, kg."""
+        """Mass of the unknown faces, kg."""
         masses = self.grid.zeros_faces()
         for axis, part in zip(self.grid.axes, self.system.systems, strict=True):
-            counts = (part.kind == UNKNOWN) | (part.kind == TIED)
-            masses[axis][:] = np.where(counts, part.mass * self.system.dt, 0.0)
+            masses[axis][:] = np.where(part.kind == UNKNOWN, part.mass * self.system.dt, 0.0)
         return masses
 
     def places(self, axis: int) -> Array:
@@ -386,7 +385,6 @@ def test_bodies_get_what_the_fluid_loses(
     exchanged = dt * float(np.abs(walls.weight @ (ends - rigid)).sum())
     bound = exchanged * (1e-10 if shape == DISC else 1e-9)  # rounding of the start, 1e3 times that
     np.testing.assert_allclose(gained, lost, rtol=0.0, atol=bound)
-    np.testing.assert_allclose(ends[walls.tied], rigid[walls.tied], atol=1e-9)
 
 
 @pytest.mark.parametrize("grid", [SQUARE, CUBE], ids=["slab", "box"])
@@ -422,8 +420,7 @@ def test_light_free_bodies_and_fluid_go_together_however_long_the_step(density: 
     fluid = np.array([m.sum() for m in case.mass()])[:2]
     mean = (case.momentum(start)[:2] + carried) / (fluid + masses.sum())
     for axis, part in zip(SQUARE.axes, case.system.systems, strict=True):
-        moving = (part.kind == UNKNOWN) | (part.kind == TIED)
-        np.testing.assert_allclose(after[axis][moving], mean[axis], atol=1e-4)
+        np.testing.assert_allclose(after[axis][part.kind == UNKNOWN], mean[axis], atol=1e-4)
     moved = (twist + mobility @ impulse).reshape(3, 6)[1:]
     np.testing.assert_allclose(moved[:, 5], 0.0, atol=1e-4)
     np.testing.assert_allclose(moved[:, :2], np.tile(mean, (2, 1)), atol=1e-4)

@@ -8,8 +8,8 @@ import pytest
 from flowborne.kernels.smoothing import (
     BLOCK,
     STEPS,
+    WEIGHTS,
     apply_laplacian,
-    defect,
     first_smooth,
     smooth,
     smooth_down,
@@ -56,15 +56,15 @@ def test_smoothing_on_the_way_down_and_up(shape: tuple[int, int, int], threads: 
     expected, left = x.copy(), r.copy()
     first_smooth(expected, b, inverse)
     K = operator(w, inverse)
-    smooth(left, expected, b, K, 1)
-    smooth(expected, left, b, K, 2)
-    defect(left, expected, b, K)
+    smooth(left, expected, b, K, WEIGHTS[1])
+    smooth(expected, left, b, K, WEIGHTS[2])
+    smooth(left, expected, b, K, None)
     getattr(smooth_down, threads)(x, r, b, K)
     np.testing.assert_array_equal(x, expected)
     np.testing.assert_array_equal(r, left)
-    smooth(expected, left, b, K, 2)
-    smooth(left, expected, b, K, 1)
-    smooth(expected, left, b, K, 0)
+    smooth(expected, left, b, K, WEIGHTS[2])
+    smooth(left, expected, b, K, WEIGHTS[1])
+    smooth(expected, left, b, K, WEIGHTS[0])
     getattr(smooth_up, threads)(x, r, b, K)
     np.testing.assert_array_equal(x, expected)
 
@@ -78,7 +78,7 @@ def test_many_steps_on_the_coarsest_level(shape: tuple[int, int, int], even: int
     K[4][...] = even
     expected, left = x.copy(), r.copy()
     for step in range(1, 9):
-        smooth(left, expected, b, K, step % STEPS)
+        smooth(left, expected, b, K, WEIGHTS[step % STEPS])
         expected, left = left, expected
     smooth_often(x, r, b, K, 9)
     np.testing.assert_array_equal(x, expected)

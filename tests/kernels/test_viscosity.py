@@ -7,16 +7,15 @@ import itertools
 import numpy as np
 import pytest
 
+from flowborne.fluid.viscosity import kinds_of_faces
 from flowborne.kernels.arrays import FREE, PERIODIC, PRESCRIBED
 from flowborne.kernels.edge_crossings import new_crossings
 from flowborne.kernels.viscosity import (
     GIVEN,
     INACTIVE,
-    TIED,
     UNKNOWN,
     CutFaces,
     apply_component,
-    classify,
     face_distances,
     find_centres,
     link_faces,
@@ -25,7 +24,6 @@ from flowborne.kernels.viscosity import (
 
 from .cut_cells import SHAPES, cut, face_shape
 from .references.viscosity import (
-    classify_reference,
     face_distances_reference,
     find_centres_reference,
     link_faces_reference,
@@ -49,7 +47,7 @@ def kinds(shape: tuple[int, int, int], normal: np.ndarray, axis: int) -> tuple:
     """The cut grid, centres, open parts of the cells and kinds; some open faces inside are
     prescribed."""
     made = cut(shape)
-    kind = classify_reference(made.opened[axis], axis, normal, 0.3)
+    kind = kinds_of_faces(made.opened[axis], axis, normal)
     random = np.random.default_rng(1)
     kind[(kind == UNKNOWN) & (random.random(kind.shape) < 0.1)] = GIVEN
     parts = random.random(shape) * (random.random(shape) < 0.9)
@@ -62,10 +60,13 @@ def test_distances_and_kinds(shape: tuple, normal: np.ndarray, axis: int) -> Non
     phi = np.empty(face_shape(shape, axis))
     face_distances(made.distance, axis, phi)
     np.testing.assert_allclose(phi, face_distances_reference(made.distance, axis), atol=1e-15)
-    kind = np.empty(phi.shape, np.uint8)
-    classify(kind, made.opened[axis], axis, normal, 0.3)
-    expected = classify_reference(made.opened[axis], axis, normal, 0.3)
-    assert {INACTIVE, UNKNOWN, TIED} <= set(np.unique(expected))
+    opened = np.moveaxis(made.opened[axis], axis, 0)
+    kind = np.moveaxis(kinds_of_faces(made.opened[axis], axis, normal), axis, 0)
+    given = {PRESCRIBED: GIVEN, FREE: UNKNOWN, PERIODIC: UNKNOWN}
+    expected = np.where(opened > 0.0, UNKNOWN, INACTIVE)
+    expected[0] = np.where(opened[0] > 0.0, given[normal[axis, 0]], INACTIVE)
+    last = INACTIVE if normal[axis, 1] == PERIODIC else given[normal[axis, 1]]
+    expected[-1] = np.where(opened[-1] > 0.0, last, INACTIVE)
     np.testing.assert_array_equal(kind, expected)
 
 

@@ -13,10 +13,8 @@ from flowborne.kernels.arrays import Array
 from flowborne.kernels.closed_fractions import open_cells
 from flowborne.kernels.cut_faces import closed_face
 from flowborne.kernels.edge_crossings import Crossings, new_crossings
-from flowborne.kernels.node_distance import allow_for_curvature
 
-from .cut_cells import SHAPES, cut, face_shape
-from .references.node_distance import allow_for_curvature_reference
+from .cut_cells import face_shape
 
 PART = st.floats(-1.0, 1.0)
 
@@ -126,12 +124,3 @@ def test_cells_without_an_open_face_hold_nothing() -> None:
     open_cells(out, 1.0, distance, found, tuple(faces), box)
     assert out[0, 0, 0] == 0.0
     assert out.sum() == 7.0
-
-
-@pytest.mark.parametrize("shape", SHAPES)
-def test_allow_for_curvature(shape: tuple[int, int, int]) -> None:
-    """Of two balls: at the kinks between them the distance is left as it is, and so in a slab."""
-    distance = cut(shape).distance
-    found = allow_for_curvature(distance, 0.5)
-    assert (found != distance).any() == (shape[2] > 1)
-    np.testing.assert_allclose(found, allow_for_curvature_reference(distance, 0.5), atol=1e-15)

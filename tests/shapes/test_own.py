@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 import flowborne as fb
 from flowborne.parts import PlacedShape
 from flowborne.scenes.load import check_scene
-from flowborne.shapes.own import ShapeOwn, triangulated
+from flowborne.shapes.own import ShapeOwn, allow_for_curvature, triangulated
 from flowborne.worlds import advance, cut_by_bodies, make_world
 
 from ..own_parts.torus import Torus
@@ -59,6 +59,15 @@ def test_the_fluid_sees_its_volume(n: int) -> None:
     cut = cut_by_bodies(make_world(ring(PLACED), grid))
     solid = grid.shape[0] ** 3 * h**3 - cut.volume.sum()
     assert solid == pytest.approx(VOLUME, rel=0.03 if n == 24 else 6e-3)
+
+
+def test_curvature_counts_where_the_distance_has_no_kink() -> None:
+    """Of a ball with a radius of 20 pitches, h^2/12 2/R; not of a thin plate."""
+    x, y, z = 0.5 * (np.indices((48, 48, 48)) - 23.5)
+    ball, plate = np.sqrt(x**2 + y**2 + z**2) - 10.0, np.abs(x) - 0.25
+    less = (ball - allow_for_curvature(ball, 0.5))[np.abs(ball) < 0.5]
+    np.testing.assert_allclose(less, 0.25 / 60.0, rtol=0.15)
+    np.testing.assert_array_equal(allow_for_curvature(plate, 0.5), plate)
 
 
 def test_fluid_goes_through_the_hole_and_not_through_the_ring() -> None:

@@ -46,9 +46,6 @@ from flowborne.kernels.edge_crossings import (
 from flowborne.kernels.node_distance import BAND, NEAR, lower_to_body, merge, node_box
 from flowborne.kernels.skin import cross_skin, sample_skin
 
-ITS_FOLDS = 2
-"""How many bodies a skin counts for where creases are looked for: it may fold onto itself."""
-
 OTHER_AXES = np.array([other_axes(d) for d in range(3)])
 """(3, 2) the axes along a face, for each axis that it may be across."""
 
@@ -220,7 +217,7 @@ def geometry(
     crossings = together(distance.shape, [piece.crossings for piece in pieces])
     for piece in pieces:
         merge(distance, nearest, piece.distance, piece.box, piece.body)
-        bodies = 1 if piece.body < first_skin else ITS_FOLDS
+        bodies = 1 + int(piece.body >= first_skin)  # a skin may fold onto itself
         count_beside(beside, piece.distance, piece.box, bodies)
     around = [d for d in range(3) if boundaries.periodic()[d]]
     for d in around:

@@ -5,9 +5,8 @@ With B the velocity of the wall points and C the couple of the bodies' own rotat
 
     (m/dt + L + W) u - W B s = m u*/dt + given          s = s* + M dt (B^T W (u - B s) - C s)
 
-where L are the links and M the motion that a unit impulse gives. W is diagonal but at corners of
-bodies. Tied faces, whose velocity is B s, count among the walls with the weight m/dt. The bodies
-are eliminated exactly,
+where L are the links and M the motion that a unit impulse gives. W is diagonal but at corners. The
+bodies are eliminated exactly,
 
     s = s* + N dt (B^T W (u - B s*) - C s*)             N = (M^-1 + dt (B^T W B + C))^-1
 
@@ -23,7 +22,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
-from scipy.sparse import block_diag, csr_array, diags_array
+from scipy.sparse import block_diag, csr_array
 
 from flowborne.coupling.flesh import skin_at
 from flowborne.coupling.fractions import Geometry
@@ -37,11 +36,11 @@ from flowborne.fluid.ghosts import edge
 from flowborne.fluid.grid import Grid, faces_of
 from flowborne.fluid.projection import PressureGradient
 from flowborne.fluid.viscosity import OpenParts, ViscousFaces, assemble_viscosity
-from flowborne.kernels.arrays import Array, Faces, Integers, Mask
+from flowborne.kernels.arrays import Array, Faces, Integers
 from flowborne.kernels.corner_friction import AROUND
 from flowborne.kernels.projection import fill_fresh
 from flowborne.kernels.sparse_rows import add_rows, sum_rows
-from flowborne.kernels.viscosity import TIED, apply_component
+from flowborne.kernels.viscosity import apply_component
 from flowborne.solids.driven import Driven
 from flowborne.solids.dynamics import Kinematics
 from flowborne.solvers.conjugate_gradients import conjugate_gradients, spread
@@ -57,22 +56,19 @@ for a domain of MOST cells."""
 
 @dataclass(frozen=True)
 class Walls:
-    """Pieces of wall beside faces, faces around corners, and faces tied to a body, listed over all
-    components.
+    """Pieces of wall beside faces, and faces around corners, listed over all components.
 
     index   (n,) position among the concatenated faces; a face may have several pieces
-    tied    (n,) whether the face moves with the body
-    weight  (n, n) W, and m/dt of tied faces, kg/s
+    weight  (n, n) W, kg/s
     body    (n,) the body
     columns (n, m) entries of the motion that move the point, the twist of its body unless told
     arm     (n, m) velocity of the point along the face's axis for each of them
     across  (n, 3) unit vector of the axis that the face is across
-    point   (n, 3) middle of the piece, or centre of the tied face's open part, m
+    point   (n, 3) middle of the piece, or centre of the open part of a face around a corner, m
     gap     (n, 3) from there to the centre of the face's open part, m
     """
 
     index: Integers
-    tied: Mask
     weight: csr_array
     body: Integers
     columns: Integers
@@ -132,11 +128,10 @@ def walls_of(systems: list[ViscousFaces], cut: Geometry, grid: Grid) -> Walls:
 
 
 def walls_across(axis: int, system: ViscousFaces, cut: Geometry, grid: Grid) -> Walls:
-    """The pieces of wall of the faces across `axis`, those around corners, and the tied ones; each
-    belongs to the body nearest to one of its nodes."""
-    moved = np.flatnonzero(system.kind == TIED)
+    """The pieces of wall of the faces across `axis`, and those around corners; each belongs to the
+    body nearest to one of its nodes."""
     around, _, corner_node = system.corners
-    index = np.concatenate([system.beside, around.ravel(), moved])
+    index = np.concatenate([system.beside, around.ravel()])
     at = np.stack(np.unravel_index(index, system.kind.shape), axis=1)
     coordinates = grid.face_coordinates(axis)
     point = np.stack([coordinates[d][at[:, d]] for d in range(3)], axis=1)
@@ -146,19 +141,13 @@ def walls_across(axis: int, system: ViscousFaces, cut: Geometry, grid: Grid) -> 
     others = [d for d in range(3) if d != axis]
     met = system.beside.size
     point[met:, others] += system.centre.reshape(2, -1)[:, index[met:]].T
-    one, other = np.delete(np.eye(3, dtype=np.int64), axis, 0)
-    low = at[met + around.size :]
-    corners = np.stack([low, low + one, low + other, low + one + other])
-    which = np.argmin(cut.distance[tuple(np.moveaxis(corners, -1, 0))], axis=0)
-    corner = corners[which, np.arange(moved.size)]
     nodes = np.concatenate([system.node, np.repeat(corner_node, AROUND)])
-    body = np.concatenate([cut.nearest.reshape(-1)[nodes], cut.nearest[tuple(corner.T)]])
+    body = cut.nearest.reshape(-1)[nodes]
     point = cut.images.at_bodies(point, body)
     across = np.tile(np.eye(3)[axis], (index.size, 1))
     return Walls(
         index=system.first + index,
-        tied=np.arange(index.size) >= met + around.size,
-        weight=weights(system, system.mass.reshape(-1)[moved]),
+        weight=weights(system),
         body=body,
         columns=6 * body[:, None] + np.arange(6),
         arm=np.concatenate([across, np.cross(point, across)], axis=1),
@@ -168,17 +157,14 @@ def walls_across(axis: int, system: ViscousFaces, cut: Geometry, grid: Grid) -> 
     )
 
 
-def weights(system: ViscousFaces, tied: Array) -> csr_array:
-    """(n, n) W of a component: walls, corners, and the faces with these masses that are tied."""
-    values = system.wall, system.corners.matrix.ravel(), tied
+def weights(system: ViscousFaces) -> csr_array:
+    """(n, n) W of a component: walls and corners."""
+    values = np.concatenate([system.wall, system.corners.matrix.ravel()])
     first, around = system.wall.size, system.corners.faces.size
-    total = first + around + tied.size
-    each = np.ones(total, np.int64)
-    each[first : first + around] = AROUND
     columns = np.repeat(np.arange(first, first + around).reshape(-1, 1, AROUND), AROUND, axis=1)
-    places = np.arange(first), columns.ravel(), np.arange(first + around, total)
-    starts = np.append(0, np.cumsum(each))
-    return csr_array((np.concatenate(values), np.concatenate(places), starts), (total, total))
+    places = np.concatenate([np.arange(first), columns.ravel()])
+    starts = np.append(0, np.cumsum(np.repeat([1, AROUND], [first, around])))
+    return csr_array((values, places, starts), (first + around, first + around))
 
 
 def between_faces(systems: list[ViscousFaces], scale: Array) -> tuple[Integers, csr_array]:
@@ -226,9 +212,8 @@ class ViscousSystem:
         self.couples = walls.couples(bodies)
         self.answer = answering(dt * walls.drag(self.couples, size))
         count, entries = walls.arm.shape
-        self.loose = diags_array(1.0 - walls.tied) @ walls.weight
         scale = self.scale[walls.index]
-        pull = scale[:, None] * (self.loose @ walls.arm)
+        pull = scale[:, None] * (walls.weight @ walls.arm)
         starts = np.arange(0, count * entries + 1, entries)
         self.rows = walls.index, starts, walls.columns.ravel(), pull.ravel()
         self.corner_faces, self.corners = between_faces(systems, self.scale)
@@ -272,14 +257,12 @@ class ViscousSystem:
         unknown = self.diagonal > 0.0
         rhs = np.where(unknown, mass * start + given, 0.0)
         known = self.answer.to(self.push(np.where(unknown, 0.0, start), twist, blown))[0]
-        np.add.at(rhs, walls.index, self.loose @ (self.at_walls(twist + known) + blown))
+        np.add.at(rhs, walls.index, walls.weight @ (self.at_walls(twist + known) + blown))
         guess, right = np.where(unknown, start, 0.0), spread(self.scale * rhs)
         y = spread(guess * np.sqrt(self.diagonal))
         converged = conjugate_gradients(self.apply, right, y, tolerance, self.most)
         result = np.where(unknown, self.scale * y.reshape(-1)[: start.size], start)
-        change, impulse = self.answer.to(self.push(result, twist, blown))
-        skin = self.at_walls(twist + change) + blown
-        result[walls.index[walls.tied]] = skin[walls.tied]
+        impulse = self.answer.to(self.push(result, twist, blown))[1]
         return self._split(result, velocity), impulse, converged
 
     def push(self, velocity: Array, twist: Array, slip: Array) -> Array:

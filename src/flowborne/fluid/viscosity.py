@@ -33,24 +33,22 @@ from typing import NamedTuple
 import numpy as np
 
 from flowborne.fluid.boundary import Boundaries
+from flowborne.fluid.ghosts import edge
 from flowborne.fluid.grid import Grid
-from flowborne.kernels.arrays import PRESCRIBED, Array, Faces, Integers, Marks
-from flowborne.kernels.control_volumes import CLOSED_BELOW
+from flowborne.kernels.arrays import PERIODIC, PRESCRIBED, Array, Faces, Integers, Marks
 from flowborne.kernels.corner_friction import corner_stiffness, find_corners
 from flowborne.kernels.edge_crossings import Crossings
+from flowborne.kernels.node_distance import NEAR
 from flowborne.kernels.viscosity import (
+    GIVEN,
     INACTIVE,
     UNKNOWN,
     CutFaces,
-    classify,
     face_distances,
     find_centres,
     link_faces,
     meet_walls,
 )
-
-NEAR = 2.0
-"""Mean distance of a face's corners from bodies beyond which it is not beside one, cells."""
 
 SIDE_MASS = 0.75
 """Part of the mass of the faces along a side with friction that this slows down: what
@@ -75,7 +73,7 @@ class ViscousFaces:
     """The viscous system of the faces across one axis; arrays have the shape of the faces.
 
     first     position of the component among the concatenated faces
-    kind      INACTIVE, UNKNOWN, GIVEN or TIED
+    kind      INACTIVE, UNKNOWN or GIVEN
     mass      m / dt, kg/s; see SIDE_MASS
     diagonal  m / dt + sum of links + W of unknowns, else 0, kg/s
     links     (3, ...) k to the next face along each axis, between unknowns, kg/s
@@ -149,10 +147,9 @@ def assemble_viscosity(
     found = find_corners(*edges, h)
     for axis in grid.axes:
         shape, opened = grid.face_shape(axis), cut.faces[axis]
-        kind, away = np.empty(shape, np.uint8), np.empty(shape)
+        kind, away = kinds_of_faces(opened, axis, normal), np.empty(shape)
         face_distances(cut.distance, axis, away)
         away -= NEAR * h
-        classify(kind, opened, axis, normal, CLOSED_BELOW)
         near = np.flatnonzero((kind != INACTIVE) & (away <= 0.0))
         centre = np.zeros((2, *shape))
         find_centres(*edges, axis, near, centre, grid.is_slab)
@@ -178,6 +175,21 @@ def assemble_viscosity(
         system = first, kind, mass, diagonal, links, given, h * centre, *pieces, corners
         systems.append(ViscousFaces(*system))
     return systems
+
+
+def kinds_of_faces(opened: Array, axis: int, normal: Integers) -> Marks:
+    """Kind of every face across `axis` from its open part.
+
+    normal  (3, 2) a of the velocity across the sides, see `fluid.sides.side`
+    """
+    kind = np.where(opened > 0.0, np.uint8(UNKNOWN), np.uint8(INACTIVE))
+    for at, side in zip((0, -1), normal[axis], strict=True):
+        layer = kind[edge(axis, at)]
+        if side == PRESCRIBED:
+            layer[layer == UNKNOWN] = GIVEN
+        elif side == PERIODIC and at:
+            layer[:] = INACTIVE
+    return kind
 
 
 def stick_to_sides(

@@ -13,6 +13,7 @@ import numpy as np
 from numba import prange
 
 from flowborne.kernels.arrays import Array, Indices, Integers, Marks, Periodic, Real, Triple
+from flowborne.kernels.control_volumes import stride
 from flowborne.kernels.jit import kernel
 
 OWN = 8
@@ -66,7 +67,6 @@ def mark_largest(
     marks: Marks, w: Triple, inverse: Real, first: tuple[int, int, int], end: tuple[int, int, int]
 ) -> None:
     """Mark the largest connected part of at most 2 x 2 x 2 cells as OWN, the others as 0."""
-    w0, w1, w2 = w
     part, size = np.full(8, -1), np.zeros(8, np.int64)
     for i in range(first[0], end[0]):
         for j in range(first[1], end[1]):
@@ -83,13 +83,8 @@ def mark_largest(
                 m = n ^ (4 >> axis)
                 if m > n or part[n] < 0 or part[m] < 0 or part[n] == part[m]:
                     continue
-                if axis == 0:
-                    share = w0[i, j, k] * max(inverse[i, j, k], inverse[i - 1, j, k])
-                elif axis == 1:
-                    share = w1[i, j, k] * max(inverse[i, j, k], inverse[i, j - 1, k])
-                else:
-                    share = w2[i, j, k] * max(inverse[i, j, k], inverse[i, j, k - 1])
-                if share > WEAK:
+                below = i - int(axis == 0), j - int(axis == 1), k - int(axis == 2)
+                if w[axis][i, j, k] * max(inverse[i, j, k], inverse[below]) > WEAK:
                     part[n] = part[m] = min(part[n], part[m])
                     changed = True
     for n in range(8):
@@ -146,14 +141,10 @@ def neighbour(at: int, axis: int, up: int, shape: Integers, periodic: Periodic) 
     up     0: lower face, 1: upper face
     shape  of the padded array
     """
-    stride = shape[2] if axis == 1 else (1 if axis == 2 else shape[1] * shape[2])
-    place = (at // stride) % shape[axis]
-    inner = shape[axis] - 2
-    if up and place == inner:
-        return at - (inner - 1) * stride if periodic[axis] else -1
-    if not up and place == 1:
-        return at + (inner - 1) * stride if periodic[axis] else -1
-    return at + (2 * up - 1) * stride
+    step, inner, way = stride(shape, axis), shape[axis] - 2, 2 * up - 1
+    if (at // step) % shape[axis] == (inner if up else 1):
+        return at - way * (inner - 1) * step if periodic[axis] else -1
+    return at + way * step
 
 
 @kernel
@@ -169,11 +160,7 @@ def cover(at: int, shape: Integers, factor: Integers, coarse_shape: Integers) ->
 @kernel
 def face_of(w: Triple, shape: Integers, axis: int, at: int, up: int) -> float:
     """Weight of the lower or upper face of a cell."""
-    if axis == 0:
-        return float(w[0].reshape(-1)[at + up * shape[1] * shape[2]])
-    if axis == 1:
-        return float(w[1].reshape(-1)[at + up * shape[2]])
-    return float(w[2].reshape(-1)[at + up])
+    return float(w[axis].reshape(-1)[at + up * stride(shape, axis)])
 
 
 @kernel
@@ -268,14 +255,13 @@ def add_between(
     """Add a fine weight to the coarse face between two coarse cells, if they share one."""
     low, high = min(a, b), max(a, b)
     for axis in range(3):
-        stride = shape[2] if axis == 1 else (1 if axis == 2 else shape[1] * shape[2])
-        inner = shape[axis] - 2
-        place = (high // stride) % shape[axis]
+        step, inner = stride(shape, axis), shape[axis] - 2
+        place = (high // step) % shape[axis]
         w = coarse[axis].reshape(-1)
-        if high - low == stride and place > 1:
+        if high - low == step and place > 1:
             w[high] += weight * ratio[axis, place - 1]
             return
-        if periodic[axis] and high - low == (inner - 1) * stride and place == inner:
+        if periodic[axis] and high - low == (inner - 1) * step and place == inner:
             w[low] += weight * ratio[axis, 0]
-            w[high + stride] += weight * ratio[axis, inner]
+            w[high + step] += weight * ratio[axis, inner]
             return

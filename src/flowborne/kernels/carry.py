@@ -24,7 +24,6 @@ from flowborne.kernels.arrays import (
 from flowborne.kernels.control_volumes import (
     Closed,
     Transfers,
-    across_axis,
     fill_empty,
     indices,
     join_small,
@@ -238,7 +237,7 @@ def mark_volumes(marks: Marks, cut: Integers, sides: Sides, faces: FaceGrid) -> 
 def add_side_rates(total: Array, flux: Fluxes, axis: int, listed: Integers, shape: Three) -> None:
     """Add volume per time that leaves listed control volumes through their sides across an axis,
     in place."""
-    q, component = across_axis(flux.through, axis), flux.component
+    q, component = flux.through[axis], flux.component
     own, through = int(axis == component), q.reshape(-1)
     place, share = flux.place[own], flux.share[own]
     along, step = stride(q.shape, component), stride(q.shape, axis)
@@ -287,7 +286,7 @@ def cross_sides(sides: Sides, flux: Fluxes, cells: Array, faces: FaceGrid) -> No
         axis, upper, first = row[AXIS], row[UPPER], row[FIRST]
         if row[NORMAL] == PERIODIC:
             continue
-        q, total = across_axis(flux.through, axis), 0.0
+        q, total = flux.through[axis], 0.0
         one, other = int(axis == 0), 2 - int(axis == 2)
         for a in range(shape[one]):
             for b in range(shape[other]):

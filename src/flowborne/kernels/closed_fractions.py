@@ -12,8 +12,8 @@ import numpy as np
 from numba import njit
 
 from flowborne.kernels.arrays import PERIODIC, PRESCRIBED, Array, Faces, Integers, Nodes
-from flowborne.kernels.control_volumes import across_axis
 from flowborne.kernels.cut_faces import (
+    SAME,
     closed_face,
     crossing_from,
     is_cut,
@@ -57,7 +57,7 @@ class Piece(NamedTuple):
 def close_faces(piece: Piece, total: Array, axis: int) -> None:
     """What one body alone closes of each face across `axis` in its box, in place; added to `total`,
     too."""
-    own, centre = across_axis(piece.share, axis), across_axis(piece.centre, axis)
+    own, centre = piece.share[axis], piece.centre[axis]
     box, flat, phi, found = piece.box, piece.nodes.flat, piece.distance, piece.crossings
     for i in range(own.shape[0]):
         for j in range(own.shape[1]):
@@ -129,7 +129,7 @@ def share_closed(
               the body, decides what crosses
     returns   (n,) flat indices of the faces, (n,) its parts, and (n, 2) their centres
     """
-    share, centre = across_axis(piece.share, axis), across_axis(piece.centre, axis)
+    share, centre = piece.share[axis], piece.centre[axis]
     box, flat, count = piece.box, piece.nodes.flat, 0
     most, (_, nj, nk) = np.count_nonzero(share), opened.shape
     faces, part, middle = np.empty(most, np.int64), np.empty(most), np.empty((most, 2))
@@ -145,7 +145,7 @@ def share_closed(
                 if own != all_own:
                     union = closed_part(centre, (a, b, c), distance, found, axis, (i, j, k), flat)
                 if union > 1.0 - CREASE and (
-                    union > 1.0 - 1e-9 or in_a_crease(beside, axis, i, j, k, ring)
+                    union > 1.0 - SAME or in_a_crease(beside, axis, i, j, k, ring)
                 ):
                     union = 1.0
                     centre[:, a, b, c] = 0.0

@@ -32,7 +32,7 @@ from flowborne.kernels.regions import remove_null
 from flowborne.kernels.smoothing import apply_laplacian, turn_and_apply
 from flowborne.kernels.sparse_rows import add_rows, sum_rows
 from flowborne.kernels.v_cycle import v_cycle
-from flowborne.kernels.vectors import descend, dot, in_order, scaled, true_residual, turn
+from flowborne.kernels.vectors import descend, dot, in_order, scaled, turn
 
 LIMIT = 500
 """Most iterations."""
@@ -203,6 +203,7 @@ def solve(
         x[:] = 0.0
         return 0, 1.0 if norm > 0.0 else norm, norm <= goal
     while True:
+        scaled(rhs, r, 1.0)
         if guessed or iterations:
             if not applied:
                 remove_null(x, label, null)
@@ -211,12 +212,10 @@ def solve(
                 apply_low_rank(q, x, rows, mobility)
                 add_term(q, x, *beyond)
             applied = False
-            square = true_residual(r, rhs, q)
+            square = descend(None, r, None, q, 1.0)
             if null.size:
                 remove_null(r, label, null)
                 square = dot(r, r)
-        else:
-            scaled(rhs, r, 1.0)
         residual = np.sqrt(square)
         converged = residual <= goal
         if converged or not residual < STAGNATION * last or iterations >= LIMIT:

@@ -11,24 +11,12 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit, prange
 
-from flowborne.kernels.arrays import (
-    PERIODIC,
-    PRESCRIBED,
-    Array,
-    FaceGrid,
-    Faces,
-    Integers,
-    Marks,
-    Three,
-)
+from flowborne.kernels.arrays import PERIODIC, PRESCRIBED, Array, FaceGrid, Integers, Marks, Three
 from flowborne.kernels.faces import mean_row
 from flowborne.kernels.jit import inlined, kernel
 
 AHEAD = 16
 """Places that a list is gone through before it is searched."""
-
-CLOSED_BELOW = 1e-9
-"""Open part of a face up to which it counts as closed."""
 
 DRIVEN, PART, SHUT, UNEVEN, LISTED = 1, 2, 4, 8, 16
 """Kinds of faces: pressure acts on it; its control volume is not whole; pressure does not act on
@@ -58,14 +46,6 @@ class Transfers(NamedTuple):
     givers: Integers
     takers: Integers
     volume: Array
-
-
-@njit(nogil=True, cache=True)
-def across_axis(faces: Faces, axis: int) -> Array:
-    """The field of the faces across an axis."""
-    if axis == 0:
-        return faces[0]
-    return faces[1] if axis == 1 else faces[2]
 
 
 @inlined
@@ -417,7 +397,7 @@ def kind_of(
     goal   what it would move if it were open
     own    whether its velocity is not prescribed, and it is not another one
     """
-    pushed = own and opened > CLOSED_BELOW and volume > nothing
+    pushed = own and opened > 0.0 and volume > nothing
     shut = own and not pushed and volume != 0.0
     uneven = pushed and abs(volume - goal * opened) > slack
     return DRIVEN * pushed + PART * (volume < least) + SHUT * shut + UNEVEN * uneven

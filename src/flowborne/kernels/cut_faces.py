@@ -14,6 +14,9 @@ from flowborne.kernels.arrays import Array, Integers
 from flowborne.kernels.edge_crossings import PIECES, Crossings
 from flowborne.kernels.jit import inlined
 
+SAME = 1e-9
+"""Open parts of faces that differ by less are the same: one below it is closed."""
+
 FLAT = 1e-2
 """Turn of the normal along an arc, radians, below which its area is that of a parabola's; smaller
 ones leave rounding errors."""

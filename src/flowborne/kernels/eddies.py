@@ -35,12 +35,11 @@ def positions(shape: Integers, axis: int, wraps: Integers, reach: int) -> Intege
     none = -shape[0] * shape[1] * shape[2]
     found = np.full((3, shape.max() + 2 * reach + 1), none)
     for a in range(3):
-        stride = shape[1] * shape[2] if a == 0 else (shape[2] if a == 1 else 1)
         sides = int(a != axis and wraps[a] == 0)
         for n in range(found.shape[1]):
             at = (n - reach) % wraps[a] if wraps[a] > 0 else n - reach
             if sides <= at < shape[a] - sides:
-                found[a, n] = at * stride
+                found[a, n] = at * stride(shape, a)
     return found
 
 

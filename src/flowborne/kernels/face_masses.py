@@ -17,7 +17,6 @@ from flowborne.kernels.control_volumes import (
     LISTED,
     Closed,
     Transfers,
-    across_axis,
     all_beside,
     both_beside,
     cell_beside,
@@ -99,8 +98,8 @@ def openings(
     cell    volume of a whole one
     """
     above, way, rest = np.empty(listed.size, np.int64), np.zeros(listed.size), np.zeros(listed.size)
-    across, room = across_axis(opened, axis), cells.reshape(-1)
-    own, sides = across_axis(opened, faces.component).reshape(-1), across.reshape(-1)
+    across, room = opened[axis], cells.reshape(-1)
+    own, sides = opened[faces.component].reshape(-1), across.reshape(-1)
     wide, kind, near = across.shape, kinds.reshape(-1), 0
     step, count, ring = stride(faces.shape, axis), faces.shape[axis], faces.wraps[axis]
     for n in range(listed.size):
@@ -248,7 +247,7 @@ def share_out(
     cell    that of a whole one
     """
     component, shape, wraps = faces
-    flat, part_flat = volume.reshape(-1), across_axis(opened, component).reshape(-1)
+    flat, part_flat = volume.reshape(-1), opened[component].reshape(-1)
     size = listed.size
     part, held, aim = np.empty(size), np.empty(size), np.empty(size)
     for n in range(size):
@@ -315,7 +314,7 @@ def find_moving(
     """
     component, shape, _ = faces
     kinds = np.empty((shape[0], shape[1], shape[2]), np.uint8)
-    counts, own = np.empty((shape[0] * shape[1], 3), np.int64), across_axis(opened, component)
+    counts, own = np.empty((shape[0] * shape[1], 3), np.int64), opened[component]
     sort_faces(volume, kinds, counts, cells, own, component, ends, limits)
     cut, shut, uneven = listed_kinds(kinds, counts)
     closed = find_targets(shut, kinds, own, volume, cells, faces, limits[3])

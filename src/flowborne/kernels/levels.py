@@ -40,8 +40,19 @@ from flowborne.kernels.arrays import (
     Triple,
 )
 from flowborne.kernels.even import ROUNDING, SINGLE, find_even
-from flowborne.kernels.jit import kernel
-from flowborne.kernels.vectors import largest, scaled
+from flowborne.kernels.faces import largest_size
+from flowborne.kernels.jit import inlined, kernel
+from flowborne.kernels.vectors import scaled
+
+
+@inlined
+def width(c: int, size: int, cells: int, periodic: bool) -> int:
+    """Finest cells in cell c of `size` along an axis of `cells`: fewer at the upper end, none
+    beyond the ends of one that is not periodic."""
+    count = (cells + size - 1) // size
+    if periodic:
+        c = c % count
+    return min(size, cells - c * size) if 0 <= c < count else 0
 
 
 @kernel
@@ -52,18 +63,9 @@ def distance_ratio(face: int, factor: int, fine: int, cells: int, periodic: bool
     factor  1 or 2, the coarsening of this axis
     fine    finest cells in a fine cell of this axis; `cells` finest cells in all
     """
-    ratio = np.zeros(2)
-    for n in range(2):
-        size = fine if n == 0 else fine * factor
-        count = (cells + size - 1) // size
-        at = min(factor * face, count) if n == 0 else face
-        below, above = at - 1, at
-        if periodic:
-            below, above = below % count, above % count
-        for c in (below, above):
-            if 0 <= c < count:
-                ratio[n] += min(size, cells - c * size)
-    return float(ratio[0] / ratio[1])
+    at, wide = min(factor * face, (cells + fine - 1) // fine), fine * factor
+    near = width(at - 1, fine, cells, periodic) + width(at, fine, cells, periodic)
+    return near / (width(face - 1, wide, cells, periodic) + width(face, wide, cells, periodic))
 
 
 @kernel
@@ -77,25 +79,12 @@ def interpolation_weights(
     size      finest cells in a fine cell of this axis, `cells` finest cells in all
     """
     interpolation[:] = 0.0
-    if factor == 1:
-        return
-    count = (n + 1) // 2
-    for i in range(n):
-        c = i // 2
-        first, second = 2 * c, 2 * c + 1
-        if second >= n:
-            continue
-        a = float(min(size, cells - first * size))
-        b = float(min(size, cells - second * size))
-        other = c - 1 if i == first else c + 1
-        if periodic:
-            other = other % count
-        width = 0.0
-        if 0 <= other < count:
-            width = float(min(2 * size, cells - other * 2 * size))
-        reach = a + b + width
-        interpolation[i + 1] = -b / reach if i == first else a / reach
-    if periodic:
+    for i in range(n - n % 2 if factor == 2 else 0):
+        c, upper = i // 2, i % 2
+        a, b = width(2 * c, size, cells, periodic), width(2 * c + 1, size, cells, periodic)
+        reach = a + b + width(c - 1 + 2 * upper, 2 * size, cells, periodic)
+        interpolation[i + 1] = (a if upper else -b) / reach
+    if periodic and factor == 2:
         interpolation[0], interpolation[n + 1] = interpolation[n], interpolation[1]
 
 
@@ -155,22 +144,17 @@ def orphans_at(orphans: Indices, table: Integers, level: int) -> Indices:
 @kernel
 def wrap_ghosts(x: NDArray[Any], periodic: Periodic) -> None:
     """Copy the values at each end of a periodic axis to the ghosts at the other end."""
-    p0, p1, p2 = x.shape
-    if periodic[0] and p0 > 1:
-        for j in range(p1):
-            for k in range(p2):
-                x[0, j, k] = x[p0 - 2, j, k]
-                x[p0 - 1, j, k] = x[1, j, k]
-    if periodic[1]:
-        for i in range(p0):
-            for k in range(p2):
-                x[i, 0, k] = x[i, p1 - 2, k]
-                x[i, p1 - 1, k] = x[i, 1, k]
-    if periodic[2]:
-        for i in range(p0):
-            for j in range(p1):
-                x[i, j, 0] = x[i, j, p2 - 2]
-                x[i, j, p2 - 1] = x[i, j, 1]
+    flat, shape, stride = x.reshape(-1), x.shape, (x.shape[1] * x.shape[2], x.shape[2], 1)
+    for axis in range(3):
+        n, step = shape[axis] - 2, stride[axis]
+        if not periodic[axis] or n < 1:
+            continue
+        one, other = int(axis == 0), 2 - int(axis == 2)
+        for a in range(shape[one]):
+            for b in range(shape[other]):
+                at = a * stride[one] + b * stride[other]
+                flat[at] = flat[at + n * step]
+                flat[at + (n + 1) * step] = flat[at + step]
 
 
 @kernel
@@ -383,7 +367,7 @@ def fill_levels(
     table, periodic, weights, even = hierarchy[0], hierarchy[1], hierarchy[2], hierarchy[5]
     w0, w1, w2, diagonal = finest
     finest_weights(faces, (w0, w1, w2), diagonal)
-    most = largest(diagonal)
+    most = largest_size(diagonal)
     scale = 1.0 / most if most > 0.0 else 1.0
     for source, target in ((w0, weights[0]), (w1, weights[1]), (w2, weights[2])):
         scaled(source, target[: source.size], scale)

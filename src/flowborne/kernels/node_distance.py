@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 
 from flowborne.kernels.arrays import Array, Integers, Nodes
 from flowborne.kernels.edge_crossings import Placed, distance_to
-from flowborne.kernels.jit import kernel
 
 BAND = 4.0
 """Distances are known up to this many cells from a body; beyond, they are this large."""
 
-FACET = 1.0 / 12.0
-"""Mean of what linear interpolation in tetrahedra adds to the distance to a curved surface, over
-h^2 and the sum of its curvatures."""
-
 NEAR = 1.75
-"""Distance up to which curvature is allowed for, cells: the diagonal of a cell."""
+"""Distance up to which skins are exact, curvature is allowed for, and faces are beside a body,
+cells: the diagonal of a cell."""
 
 
 @njit(nogil=True, cache=True)
@@ -54,50 +50,6 @@ def lower_to_body(phi: Array, box: Integers, body: Placed, nodes: Nodes) -> None
                 phi[i, j, k] = min(phi[i, j, k], distance_to(body, x, y, z))
     if flat:
         phi[:, :, 1:] = phi[:, :, :1]
-
-
-@njit(nogil=True, cache=True)
-def gentlest(a: float, b: float, c: float) -> float:
-    """The smallest of three numbers of one sign; 0 where their signs differ."""
-    if a > 0.0 and b > 0.0 and c > 0.0:
-        return min(a, min(b, c))
-    if a < 0.0 and b < 0.0 and c < 0.0:
-        return max(a, max(b, c))
-    return 0.0
-
-
-@njit(nogil=True, cache=True)
-def bend(phi: Array, i: int, j: int, k: int, axis: int) -> float:
-    """Second difference along an axis, the gentlest of that here and those beside: 0 at a kink."""
-    di, dj, dk = int(axis == 0), int(axis == 1), int(axis == 2)
-    at = i if axis == 0 else (j if axis == 1 else k)
-    if at < 2 or at > phi.shape[axis] - 3:
-        return 0.0
-    a, b = phi[i - 2 * di, j - 2 * dj, k - 2 * dk], phi[i - di, j - dj, k - dk]
-    c, d = phi[i, j, k], phi[i + di, j + dj, k + dk]
-    e = phi[i + 2 * di, j + 2 * dj, k + 2 * dk]
-    return gentlest(a - 2.0 * b + c, b - 2.0 * c + d, c - 2.0 * d + e)
-
-
-@kernel
-def allow_for_curvature(phi: Array, h: float) -> Array:
-    """The distance with which facets leave a curved body of a room its size.
-
-    A ball of 8 cells across would lack 3.1 % of its volume. Where the distance has a kink, at edges
-    and in the middle of thin plates, it is left as it is; so it is in a slab, where a disc lacks
-    1.3 %, because there the chords that bodies push with are right as they are.
-    """
-    out = phi.copy()
-    if phi.shape[2] == 2:
-        return out
-    for plane in prange(phi.shape[0]):
-        i = np.int64(plane)
-        for j in range(phi.shape[1]):
-            for k in range(phi.shape[2]):
-                if abs(phi[i, j, k]) < NEAR * h:
-                    total = bend(phi, i, j, k, 0) + bend(phi, i, j, k, 1) + bend(phi, i, j, k, 2)
-                    out[i, j, k] -= FACET * total
-    return out
 
 
 @njit(nogil=True, cache=True)

@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit, prange
 
 from flowborne.kernels.arrays import Array, Faces, Integers, Marks
-from flowborne.kernels.control_volumes import across_axis, neighbour
+from flowborne.kernels.control_volumes import neighbour
 from flowborne.kernels.dye import face_of
 from flowborne.kernels.jit import inlined, kernel
 
@@ -172,7 +172,7 @@ def fill_fresh(pressure: Array, opened: Faces, fresh: Integers, wraps: Integers)
                 if to < 0 or flat[to] == 0.0:
                     continue
                 face = face_of(shape, way // 2, fresh[n], way % 2)
-                part = across_axis(opened, way // 2).reshape(-1)[face]
+                part = opened[way // 2].reshape(-1)[face]
                 total += part * flat[to]
                 weight += part
             if weight > 0.0:

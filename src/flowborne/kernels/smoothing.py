@@ -121,11 +121,14 @@ WEIGHTS = tuple(1.0 / (1.0 - np.cos(2.0 * np.pi * k / (2 * STEPS + 1))) for k in
 
 
 @kernel
-def smooth_plane(out: Real, x: Real, b: Real, operator: Operator, weight: float, m: int) -> None:
-    """`smooth` with a weight w_k on plane m."""
+def smooth_plane(
+    out: Real, x: Real, b: Real, operator: Operator, weight: float | None, m: int
+) -> None:
+    """`smooth` on plane m."""
     w0, w1, w2, inverse, even, common = operator
     d = 1 if x.shape[0] > 1 else 0
-    part, keep = x.dtype.type(weight), x.dtype.type(1.0 - weight)
+    if weight is not None:
+        part, keep = x.dtype.type(weight), x.dtype.type(1.0 - weight)
     c0, c1, c2 = at_cell(w0, common), at_cell(w1, common), at_cell(w2, common)
     for j in range(1, x.shape[1] - 1):
         if even[m, j]:
@@ -134,7 +137,10 @@ def smooth_plane(out: Real, x: Real, b: Real, operator: Operator, weight: float,
                 total += c2 * (x[m, j, k - 1] + x[m, j, k + 1])
                 if d:
                     total += c0 * (x[m - 1, j, k] + x[m + 1, j, k])
-                out[m, j, k] = keep * x[m, j, k] + part * inverse[m, j, k] * total
+                if weight is None:
+                    out[m, j, k] = total - np.divide(x[m, j, k], inverse[m, j, k])
+                else:
+                    out[m, j, k] = keep * x[m, j, k] + part * inverse[m, j, k] * total
         else:
             for k in range(1, x.shape[2] - 1):
                 total = b[m, j, k] + w1[m, j, k] * x[m, j - 1, k]
@@ -142,14 +148,19 @@ def smooth_plane(out: Real, x: Real, b: Real, operator: Operator, weight: float,
                 total += w2[m, j, k] * x[m, j, k - 1] + w2[m, j, k + 1] * x[m, j, k + 1]
                 if d:
                     total += w0[m, j, k] * x[m - 1, j, k] + w0[m + 1, j, k] * x[m + 1, j, k]
-                out[m, j, k] = keep * x[m, j, k] + part * inverse[m, j, k] * total
+                a = inverse[m, j, k]
+                if weight is None:
+                    left = total - np.divide(x[m, j, k], a)  # no check for 0: vector code
+                    out[m, j, k] = left if a > 0.0 else x.dtype.type(0)
+                else:
+                    out[m, j, k] = keep * x[m, j, k] + part * a * total
 
 
 @kernel
-def smooth(out: Real, x: Real, b: Real, operator: Operator, step: int) -> None:
-    """out = x after a step, counted from 0; ghosts of `out` are left alone."""
+def smooth(out: Real, x: Real, b: Real, operator: Operator, weight: float | None) -> None:
+    """out = x after a step with a weight w_k; without one what x leaves, b - K x in active cells
+    and else 0. Ghosts of `out` are left alone."""
     d = 1 if x.shape[0] > 1 else 0
-    weight = WEIGHTS[step]
     for i in prange(x.shape[0] - 2 * d):
         smooth_plane(out, x, b, operator, weight, i + d)
 
@@ -213,40 +224,6 @@ def first_smooth(x: Real, b: Real, inverse: Real) -> None:
 
 
 @kernel
-def defect_plane(r: Real, x: Real, b: Real, operator: Operator, m: int) -> None:
-    """`defect` on plane m."""
-    w0, w1, w2, inverse, even, common = operator
-    d = 1 if x.shape[0] > 1 else 0
-    c0, c1, c2 = at_cell(w0, common), at_cell(w1, common), at_cell(w2, common)
-    for j in range(1, x.shape[1] - 1):
-        if even[m, j]:
-            for k in range(1, x.shape[2] - 1):
-                total = b[m, j, k] + c1 * (x[m, j - 1, k] + x[m, j + 1, k])
-                total += c2 * (x[m, j, k - 1] + x[m, j, k + 1])
-                if d:
-                    total += c0 * (x[m - 1, j, k] + x[m + 1, j, k])
-                r[m, j, k] = total - np.divide(x[m, j, k], inverse[m, j, k])
-        else:
-            for k in range(1, x.shape[2] - 1):
-                total = b[m, j, k] + w1[m, j, k] * x[m, j - 1, k]
-                total += w1[m, j + 1, k] * x[m, j + 1, k]
-                total += w2[m, j, k] * x[m, j, k - 1] + w2[m, j, k + 1] * x[m, j, k + 1]
-                if d:
-                    total += w0[m, j, k] * x[m - 1, j, k] + w0[m + 1, j, k] * x[m + 1, j, k]
-                a = inverse[m, j, k]
-                left = total - np.divide(x[m, j, k], a)  # no check for 0: vector code
-                r[m, j, k] = left if a > 0.0 else x.dtype.type(0)
-
-
-@kernel
-def defect(r: Real, x: Real, b: Real, operator: Operator) -> None:
-    """r = b - K x in active cells, else 0; ghosts of r are left alone."""
-    d = 1 if x.shape[0] > 1 else 0
-    for i in prange(x.shape[0] - 2 * d):
-        defect_plane(r, x, b, operator, i + d)
-
-
-@kernel
 def smooth_down(x: Real, r: Real, b: Real, operator: Operator) -> None:
     """All steps from x = 0, and r what they leave, without periodic axes; r holds every other step
     meanwhile."""
@@ -266,7 +243,7 @@ def smooth_down(x: Real, r: Real, b: Real, operator: Operator) -> None:
             if one <= i - 2 < two:
                 smooth_plane(x, r, b, operator, WEIGHTS[2], i - 2 + d)
             if low <= i - 3 < high:
-                defect_plane(r, x, b, operator, i - 3 + d)
+                smooth_plane(r, x, b, operator, None, i - 3 + d)
     for between in prange(blocks - 1):
         i = planes * (between + 1) // blocks
         for m in range(i - 1, i + 1):
@@ -274,7 +251,7 @@ def smooth_down(x: Real, r: Real, b: Real, operator: Operator) -> None:
         for m in range(i - 2, i + 2):
             smooth_plane(x, r, b, operator, WEIGHTS[2], m + d)
         for m in range(i - 3, i + 3):
-            defect_plane(r, x, b, operator, m + d)
+            smooth_plane(r, x, b, operator, None, m + d)
 
 
 @kernel

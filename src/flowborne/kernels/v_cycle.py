@@ -32,7 +32,7 @@ from flowborne.kernels.levels import (
 )
 from flowborne.kernels.smoothing import (
     STEPS,
-    defect,
+    WEIGHTS,
     first_smooth,
     smooth,
     smooth_down,
@@ -206,11 +206,11 @@ def leg(hierarchy: Hierarchy, x: Real, b: Real, r: Real, level: int, down: bool)
             return
         for n in range(1 if down else 0, steps):
             wrap_ghosts(here, periodic)
-            smooth(there, here, bl, operator, n % STEPS if down else STEPS - 1 - n)
+            smooth(there, here, bl, operator, WEIGHTS[n % STEPS if down else STEPS - 1 - n])
             here, there = there, here
         wrap_ghosts(xl, periodic)
         if down and level < coarsest:
-            defect(rl, xl, bl, operator)
+            smooth(rl, xl, bl, operator, None)
             wrap_ghosts(rl, periodic)
     if down and level < coarsest:
         restrict(at_level(b, table, level + 1), rl, *between)

@@ -13,15 +13,6 @@ from flowborne.kernels.jit import inlined, kernel
 
 
 @kernel
-def largest(values: Array) -> float:
-    """Largest value of an array, at least 0."""
-    found = 0.0
-    for value in values.flat:
-        found = max(found, value)
-    return found
-
-
-@kernel
 def scaled(source: Real, target: Real, scale: float) -> None:
     """target = scale x source, in target's precision."""
     a, b = source.reshape(-1), target.reshape(-1)
@@ -54,7 +45,13 @@ def dot(a: Real, b: Array, scale: float = 1.0) -> float:
 
 @kernel
 def descend(
-    x: Array, r: Array, p: Array, q: Array, alpha: float, b: Real | None = None, scale: float = 1.0
+    x: Array | None,
+    r: Array,
+    p: Array | None,
+    q: Array,
+    alpha: float,
+    b: Real | None = None,
+    scale: float = 1.0,
 ) -> float:
     """x += alpha p, r -= alpha q, and b = scale x r in b's precision; returns r . r."""
     planes, size = r.shape[0], r.shape[2]
@@ -63,7 +60,8 @@ def descend(
         row = np.zeros(size)
         for j in range(r.shape[1]):
             for k in range(size):
-                x[i, j, k] += alpha * p[i, j, k]
+                if x is not None and p is not None:
+                    x[i, j, k] += alpha * p[i, j, k]
                 value = r[i, j, k] - alpha * q[i, j, k]
                 r[i, j, k] = value
                 if b is not None:
@@ -80,22 +78,6 @@ def turn(p: Array, z: Array, beta: float) -> None:
         for j in range(p.shape[1]):
             for k in range(p.shape[2]):
                 p[i, j, k] = z[i, j, k] + beta * p[i, j, k]
-
-
-@kernel
-def true_residual(r: Array, rhs: Array, q: Array) -> float:
-    """r = rhs - q; returns r . r."""
-    planes, size = r.shape[0], r.shape[2]
-    parts = np.zeros(planes)
-    for i in prange(planes):
-        row = np.zeros(size)
-        for j in range(r.shape[1]):
-            for k in range(size):
-                value = rhs[i, j, k] - q[i, j, k]
-                r[i, j, k] = value
-                row[k] += value * value
-        parts[i] = in_order(row)
-    return in_order(parts)
 
 
 @kernel

@@ -12,14 +12,14 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit, prange
 
-from flowborne.kernels.arrays import PERIODIC, PRESCRIBED, Array, Integers, Marks
+from flowborne.kernels.arrays import PERIODIC, Array, Integers, Marks
 from flowborne.kernels.control_volumes import indices
-from flowborne.kernels.cut_faces import closed_face, open_edge, other_axes
+from flowborne.kernels.cut_faces import SAME, closed_face, open_edge, other_axes
 from flowborne.kernels.edge_crossings import Crossings
 from flowborne.kernels.jit import inlined, kernel
 
-INACTIVE, UNKNOWN, GIVEN, TIED = range(4)
-"""A face is inside a body, solved for, prescribed by a side, or moves with the body beside it."""
+INACTIVE, UNKNOWN, GIVEN = range(3)
+"""A face is inside a body, solved for, or prescribed by a side."""
 
 LEAST = 1e-3
 """Least distance from a wall and between two faces, and least open part of a cell over that of its
@@ -27,15 +27,12 @@ faces: bounds friction where they are smaller."""
 
 Index = tuple[int, int, int]
 
-SAME = 1e-12
-"""Open parts of two faces that differ by less are the same."""
-
 
 class CutFaces(NamedTuple):
     """The faces across one axis, and what bodies leave open around them.
 
     axis       that
-    kind       INACTIVE, UNKNOWN, GIVEN or TIED
+    kind       INACTIVE, UNKNOWN or GIVEN
     distance   to the bodies at the nodes, m
     crossings  of edges with them
     opened     open part of each face
@@ -68,30 +65,6 @@ def face_distances(distance: Array, axis: int, out: Array) -> None:
                     + distance[i, j + bj, k + bk]
                     + distance[i + ai, j + aj + bj, k + bk]
                 )
-
-
-@kernel
-def classify(kind: Marks, opened: Array, axis: int, normal: Integers, touching: float) -> None:
-    """Kind of every face across `axis` from its open part.
-
-    normal  (3, 2) a of the velocity across the sides, see `fluid.sides.side`
-    """
-    last = kind.shape[axis] - 1
-    for i in prange(kind.shape[0]):
-        for j in range(kind.shape[1]):
-            for k in range(kind.shape[2]):
-                at = i if axis == 0 else (j if axis == 1 else k)
-                kind[i, j, k] = UNKNOWN
-                if opened[i, j, k] == 0.0:
-                    kind[i, j, k] = INACTIVE
-                elif (at == 0 and normal[axis, 0] == PRESCRIBED) or (
-                    at == last and normal[axis, 1] == PRESCRIBED
-                ):
-                    kind[i, j, k] = GIVEN
-                elif at == last and normal[axis, 1] == PERIODIC:
-                    kind[i, j, k] = INACTIVE
-                elif opened[i, j, k] <= touching:
-                    kind[i, j, k] = TIED
 
 
 @kernel

@@ -12,7 +12,7 @@ from flowborne.base.extras import optional
 from flowborne.base.registry import Registry
 from flowborne.kernels.arrays import Array, Integers, Mesh
 from flowborne.kernels.distance import Samples
-from flowborne.kernels.node_distance import BAND, allow_for_curvature
+from flowborne.kernels.node_distance import BAND, NEAR
 from flowborne.shapes.mesh import ShapeMesh
 from flowborne.shapes.primitives import PRIMITIVES
 from flowborne.shapes.shape import Shape, lattice, lattice_points
@@ -22,6 +22,10 @@ SAMPLES_ACROSS = 48
 
 SAMPLES_PER_CELL = 2.0
 """Samples of a distance for the fluid, per cell of its grid along an axis."""
+
+FACET = 1.0 / 12.0
+"""Mean of what linear interpolation in tetrahedra adds to the distance to a curved surface, over
+h^2 and the sum of its curvatures."""
 
 
 class OwnGeometry(Protocol):
@@ -136,6 +140,23 @@ def own_distance(geometry: OwnGeometry, points: Array) -> Array:
             f"{len(points)} points: return a finite distance in m for each"
         )
     return distance
+
+
+def allow_for_curvature(distance: Array, pitch: float) -> Array:
+    """The distance (nx, ny, nz) on a lattice with which facets leave a curved body its size.
+
+    A ball of 8 pitches across would lack 3.1 % of its volume. Where the second difference has
+    another sign beside, at edges and in the middle of thin plates, the distance is left as it is;
+    else the least of the three counts.
+    """
+    total = np.zeros_like(distance)
+    for axis in range(3):
+        second = np.diff(np.moveaxis(distance, axis, 0), 2, axis=0)
+        near = np.stack([second[:-2], second[1:-1], second[2:]])
+        same = np.abs(np.sign(near).sum(axis=0)) == 3.0
+        gentle = np.sign(near[0]) * np.abs(near).min(axis=0)
+        np.moveaxis(total, axis, 0)[2:-2] += np.where(same, gentle, 0.0)
+    return np.where(np.abs(distance) < NEAR * pitch, distance - FACET * total, distance)
 
 
 def triangulated(geometry: OwnGeometry) -> Mesh:

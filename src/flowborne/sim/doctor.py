@@ -98,11 +98,11 @@ def kernels() -> str:
     """Folder of compiled kernels, after one has been compiled or loaded from there."""
     import numpy as np
 
-    from flowborne.kernels.vectors import largest
+    from flowborne.kernels.faces import largest_size
 
-    if largest(np.array([1.0, 3.0, 2.0])) != 3.0:
+    if largest_size(np.array([[[1.0, -3.0, 2.0]]])) != 3.0:
         raise ArithmeticError("a compiled kernel computes wrongly")
-    folder = largest.serial.stats.cache_path
+    folder = largest_size.serial.stats.cache_path
     if not os.access(folder, os.W_OK):
         raise OSError(f"compiled kernels cannot be kept in {folder}")
     return f"compiled, and kept in {folder}"

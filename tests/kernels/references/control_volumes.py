@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from flowborne.kernels.arrays import Array, Integers, Marks, Mask
-from flowborne.kernels.control_volumes import CLOSED_BELOW
 
 
 def neighbours_reference(shape: Integers, wraps: Integers) -> Integers:
@@ -170,7 +169,7 @@ def find_closed_reference(
     opened: Array, volume: Array, component: int, prescribed: Marks, periodic: bool, nothing: float
 ) -> tuple[Integers, Array]:
     """`find_closed` in NumPy: closed faces, and on which ones pressure acts."""
-    driven = (volume > nothing) & (opened > CLOSED_BELOW)
+    driven = (volume > nothing) & (opened > 0.0)
     counted = (volume != 0.0) & ~driven
     for end, told in zip((0, -1), prescribed, strict=True):
         for marks in (driven, counted):

@@ -6,7 +6,7 @@ import numpy as np
 
 from flowborne.kernels.arrays import Array, Integers
 from flowborne.kernels.distance import Samples
-from flowborne.kernels.node_distance import BAND, FACET, NEAR
+from flowborne.kernels.node_distance import BAND
 
 from .distance import signed_distance_reference
 
@@ -43,16 +43,3 @@ def sample_body_reference(
         local = (x - position[g]) @ rotation[g]
         phi = np.minimum(phi, signed_distance_reference(kind[g], size[g], local, samples))
     return phi.reshape(shape)
-
-
-def allow_for_curvature_reference(phi: Array, h: float) -> Array:
-    """`allow_for_curvature` in NumPy."""
-    total = np.zeros_like(phi)
-    for axis in range(3) if phi.shape[2] > 2 else ():
-        along = np.moveaxis(phi, axis, 0)
-        second = along[:-2] - 2.0 * along[1:-1] + along[2:]
-        near = np.stack([second[:-2], second[1:-1], second[2:]])
-        same = np.abs(np.sign(near).sum(axis=0)) == 3.0
-        gentle = np.sign(near[0]) * np.abs(near).min(axis=0)
-        np.moveaxis(total, axis, 0)[2:-2] += np.where(same, gentle, 0.0)
-    return np.where(np.abs(phi) < NEAR * h, phi - FACET * total, phi)

@@ -20,7 +20,7 @@ def smooth_reference(x: Real, b: Real, w: Triple, inverse: Real, step: int) -> A
 
 
 def defect_reference(x: Real, b: Real, w: Triple, inverse: Real) -> Array:
-    """`defect` in NumPy, with ghosts 0."""
+    """`smooth` without a weight in NumPy, with ghosts 0."""
     r, inside = np.zeros(x.shape), cells_of(x)
     active = inverse > 0.0
     K_x = x / np.where(active, inverse, 1.0) - neighbour_sum(x, w)

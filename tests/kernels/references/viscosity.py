@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from flowborne.kernels.arrays import PERIODIC, PRESCRIBED, Array, Integers, Pixels
-from flowborne.kernels.viscosity import GIVEN, INACTIVE, LEAST, SAME, TIED, UNKNOWN
+from flowborne.kernels.arrays import PERIODIC, Array, Integers, Pixels
+from flowborne.kernels.cut_faces import SAME
+from flowborne.kernels.viscosity import GIVEN, LEAST, UNKNOWN
 
 from .cut_faces import closed_polygon_reference, open_edge_reference
 
@@ -18,20 +19,6 @@ def face_distances_reference(distance: Array, axis: int) -> Array:
     p = np.moveaxis(distance, axis, 0)
     mean = 0.25 * (p[:, :-1, :-1] + p[:, 1:, :-1] + p[:, :-1, 1:] + p[:, 1:, 1:])
     return np.moveaxis(mean, 0, axis)
-
-
-def classify_reference(opened: Array, axis: int, normal: Integers, touching: float) -> Pixels:
-    """`classify` in NumPy: the kinds."""
-    kind = np.where(opened <= touching, TIED, UNKNOWN).astype(np.uint8)
-    ends = np.moveaxis(kind, axis, 0)
-    if normal[axis, 0] == PRESCRIBED:
-        ends[0] = GIVEN
-    if normal[axis, 1] == PRESCRIBED:
-        ends[-1] = GIVEN
-    if normal[axis, 1] == PERIODIC:
-        ends[-1] = INACTIVE
-    kind[opened == 0.0] = INACTIVE
-    return kind
 
 
 def face_corners_reference(distance: Array, axis: int) -> Array:
