@@ -46,7 +46,7 @@ from flowborne.fluid.grid import Grid
 from flowborne.fluid.projection import PressureGradient, face_weights
 from flowborne.kernels.arrays import ROUNDING, Array, Faces, Integers
 from flowborne.kernels.coupling_rows import fastest_closed
-from flowborne.kernels.faces import largest_open
+from flowborne.kernels.faces import largest_open, largest_size
 from flowborne.kernels.projection import open_outflow
 from flowborne.solids.driven import Driven, within_limits
 from flowborne.solids.dynamics import Kinematics
@@ -231,7 +231,7 @@ def solve_together(
         moved = start + term.mobility.times(on_solids)
         net_outflow(net, after, cut, rate, grid)
         add_flux(net, cut, moved)
-        divergence = float(max(net.max(), -net.min())) / fluid.grid.cell_volume
+        divergence = largest_size(net) / fluid.grid.cell_volume
         fastest = max(largest_open(after[axis], cut.open[axis], 0.0) for axis in fluid.grid.axes)
         pushed = side_push(solution.pressure, cut.open, gradient)
         added_mass = partial(added_mass_impulse, plain, cut, change)

@@ -163,6 +163,19 @@ def is_finite(field: Array) -> bool:
 
 
 @kernel
+def largest_size(field: Array) -> float:
+    """Largest size of a field."""
+    values, most = flat(field), np.zeros(field.shape[0])
+    for i in prange(values.shape[0]):
+        found = 0.0
+        for k in range(values.shape[1]):
+            size = abs(values[i, k])
+            found = size if size > found else found
+        most[i] = found
+    return float(most.max())
+
+
+@kernel
 def largest_open(field: Array, opened: Array, more_than: float) -> float:
     """Largest size of a field on faces of which more than a part is open."""
     values, part, most = flat(field), flat(opened), np.zeros(field.shape[0])
