@@ -9,7 +9,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from flowborne.kernels.arrays import PERIODIC, PRESCRIBED, Array, Faces, Integers, Nodes
 from flowborne.kernels.control_volumes import across_axis
@@ -22,7 +21,7 @@ from flowborne.kernels.cut_faces import (
     other_axes,
 )
 from flowborne.kernels.edge_crossings import Crossings
-from flowborne.kernels.jit import inlined
+from flowborne.kernels.jit import inlined, kernel
 
 Index = tuple[int, int, int]
 
@@ -53,7 +52,7 @@ class Piece(NamedTuple):
     centre: Faces
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def close_faces(piece: Piece, total: Array, axis: int) -> None:
     """What one body alone closes of each face across `axis` in its box, in place; added to `total`,
     too."""
@@ -81,7 +80,7 @@ def closed_part(
     return closed
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def count_beside(beside: Integers, phi: Array, box: Integers, count: int) -> None:
     """Add `count` to the cells of which one body covers a corner."""
     for i in range(box[0, 0], box[0, 1] - 1):
@@ -98,7 +97,7 @@ def count_beside(beside: Integers, phi: Array, box: Integers, count: int) -> Non
                     beside[i, j, k] += count
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def in_a_crease(beside: Integers, axis: int, i: int, j: int, k: int, ring: bool) -> bool:
     """Whether two bodies, or a body and a side, bound one of the cells at face (i, j, k).
 
@@ -113,7 +112,7 @@ def in_a_crease(beside: Integers, axis: int, i: int, j: int, k: int, ring: bool)
     return False
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def share_closed(
     piece: Piece, opened: Array, total: Array, distance: Array, found: Crossings,
     beside: Integers, axis: int, ends: Integers,
@@ -162,7 +161,7 @@ def share_closed(
     return faces[:count], part[:count], middle[:count]
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def wall_point(
     distance: Array, found: Crossings, i: int, j: int, k: int, point: Array, scratch: Array
 ) -> bool:
@@ -221,7 +220,7 @@ def wall_point(
     return True
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def open_cells(
     volume: Array, whole: float, distance: Array, found: Crossings, opened: Faces, boxes: Integers
 ) -> None:

@@ -6,11 +6,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from flowborne.kernels.arrays import PRESCRIBED, Array, Integers, Kinds, Mask, Rows
 from flowborne.kernels.closed_fractions import Piece
-from flowborne.kernels.jit import inlined
+from flowborne.kernels.jit import inlined, kernel
 
 ENCLOSED, COVERED, NARROW, WIDE = 0, 1, 2, 3
 """Kinds of cells: closed in by bodies and solid sides of the domain; all faces closed by bodies; an
@@ -43,7 +42,7 @@ def through(normal: Integers, axis: int, end: int, at_end: bool) -> float:
     return 0.0 if at_end and normal[axis, end] == PRESCRIBED else 1.0
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def kinds_of_cells(ox: Array, oy: Array, oz: Array, normal: Integers, boxes: Integers) -> Kinds:
     """(nx, ny, nz) kind of each cell; WIDE outside boxes of nodes (n, 3, 2), where all faces are
     open.
@@ -76,7 +75,7 @@ def kinds_of_cells(ox: Array, oy: Array, oz: Array, normal: Integers, boxes: Int
     return kind
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def cell_wrench(wrench: Array, i: int, j: int, k: int, piece: Piece) -> None:
     """Wrench of unit pressure in cell (i, j, k) on the body: what acts on a closed part of a face
     acts at its centre."""
@@ -104,7 +103,7 @@ def cell_wrench(wrench: Array, i: int, j: int, k: int, piece: Piece) -> None:
             wrench[4] -= (x + h * cz[0, a, b, c + side]) * f
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def list_cells(piece: Piece, listed: Mask) -> tuple[Integers, Array]:
     """Listed cells (n,) with a coupling row of one body, flat, and (n, 6) its values, the wrench of
     unit pressure. Where the body closes as much on either side of a cell, at the same place, it has
@@ -129,7 +128,7 @@ def list_cells(piece: Piece, listed: Mask) -> tuple[Integers, Array]:
     return cells[:at], values[:at]
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def flesh_rows(
     axis: Integers,
     at: Integers,
@@ -173,7 +172,7 @@ def flesh_rows(
     return part[:rows], (cells[:rows], start, columns[: 3 * rows], values[: 3 * rows])
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def add_body_velocity(
     out: Array, axis: int, parts: ClosedParts, twist: Array, flesh: Array
 ) -> None:

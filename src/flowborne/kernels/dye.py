@@ -19,7 +19,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit, prange
+from numba import prange
 
 from flowborne.kernels.arrays import ROUNDING, Array, Faces, Integers, Marks, Three
 from flowborne.kernels.control_volumes import both_beside, indices, place_of, stride
@@ -235,7 +235,7 @@ class CutCells(NamedTuple):
     out: Array
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def face_of(shape: Three | Integers, axis: int, f: int, upper: int) -> int:
     """Flat index of the lower or upper face of cell f among the faces across an axis."""
     i, j, _ = indices(shape, f)
@@ -243,7 +243,7 @@ def face_of(shape: Three | Integers, axis: int, f: int, upper: int) -> int:
     return int(f + (before + upper) * stride(shape, axis))
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def list_flows(cells: CutCells, axis: int, flux: Array, wraps: Three, shape: Three) -> None:
     """Take the faces of cut cells across an axis out of the fluxes, and write what is beside and
     leaves there.
@@ -271,7 +271,7 @@ def list_flows(cells: CutCells, axis: int, flux: Array, wraps: Three, shape: Thr
                 through[face_of(shape, axis, to, 1 - upper)] = 0.0
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def pass_on(
     field: Array,
     volume: Array,

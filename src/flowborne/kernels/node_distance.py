@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
+from numba import prange
 
 from flowborne.kernels.arrays import Array, Integers, Nodes
 from flowborne.kernels.edge_crossings import Placed, distance_to
@@ -20,7 +20,7 @@ NEAR = 1.75
 """Distance up to which curvature is allowed for, cells: the diagonal of a cell."""
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def node_box(
     geoms: Integers, position: Array, rotation: Array, reach: Array, nodes: Nodes, shape: Integers
 ) -> Integers:
@@ -41,7 +41,7 @@ def node_box(
     return box
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def lower_to_body(phi: Array, box: Integers, body: Placed, nodes: Nodes) -> None:
     """Lower the distance at the nodes of a box to that of a geometry."""
     origin, h, flat = nodes
@@ -56,7 +56,7 @@ def lower_to_body(phi: Array, box: Integers, body: Placed, nodes: Nodes) -> None
         phi[:, :, 1:] = phi[:, :, :1]
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def gentlest(a: float, b: float, c: float) -> float:
     """The smallest of three numbers of one sign; 0 where their signs differ."""
     if a > 0.0 and b > 0.0 and c > 0.0:
@@ -66,8 +66,8 @@ def gentlest(a: float, b: float, c: float) -> float:
     return 0.0
 
 
-@njit(nogil=True, cache=True)
-def bend(phi: Array, i: int, j: int, k: int, axis: int) -> float:
+@kernel
+def bend(phi: Array, i: int | np.int64, j: int, k: int, axis: int) -> float:
     """Second difference along an axis, the gentlest of that here and those beside: 0 at a kink."""
     di, dj, dk = int(axis == 0), int(axis == 1), int(axis == 2)
     at = i if axis == 0 else (j if axis == 1 else k)
@@ -100,7 +100,7 @@ def allow_for_curvature(phi: Array, h: float) -> Array:
     return out
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def merge(distance: Array, nearest: Integers, phi: Array, box: Integers, body: int) -> None:
     """Lower the union's distance to that of one body inside its box."""
     for i in range(box[0, 0], box[0, 1]):
