@@ -309,7 +309,8 @@ def cross_sides(sides: Sides, flux: Fluxes, cells: Array, faces: FaceGrid) -> No
                 sides.rate[n] = (1.0 - 2.0 * upper) * through
                 sides.share[n] = held
                 total += held
-        sides.share[first : first + shape[one] * shape[other]] /= max(total, 1e-300)
+        for n in range(first, first + shape[one] * shape[other]):
+            sides.share[n] /= max(total, 1e-300)
 
 
 @kernel

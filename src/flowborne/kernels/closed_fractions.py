@@ -22,6 +22,7 @@ from flowborne.kernels.cut_faces import (
 )
 from flowborne.kernels.edge_crossings import Crossings
 from flowborne.kernels.jit import inlined, kernel
+from flowborne.kernels.triangles import along
 
 Index = tuple[int, int, int]
 
@@ -156,7 +157,7 @@ def share_closed(
                 share[a, b, c] = union * own / all_own
                 if share[a, b, c] > 0.0:
                     faces[count], part[count] = (i * nj + j) * nk + k, share[a, b, c]
-                    middle[count] = centre[:, a, b, c]
+                    middle[count, 0], middle[count, 1] = centre[0, a, b, c], centre[1, a, b, c]
                     count += 1
     return faces[:count], part[:count], middle[:count]
 
@@ -190,7 +191,8 @@ def wall_point(
                 middle[s] += x
                 middle[t] += y
     if corners > 0:
-        point[:] = middle / corners
+        for m in range(3):
+            point[m] = middle[m] / corners
         return True
     count, rise = 0, 0.0
     for d in range(3):
@@ -214,7 +216,7 @@ def wall_point(
                         rise += found.normal[e, m] * place[m]
     if count == 0:
         return False
-    rise = (rise - (mean * middle).sum() / count) / max(np.sqrt((mean**2).sum()), 1e-300) / count
+    rise = (rise - along(mean, middle) / count) / max(np.sqrt(along(mean, mean)), 1e-300) / count
     for m in range(3):
         point[m] = min(max(middle[m] / count + 0.75 * rise * mean[m], 0.0), 1.0)
     return True

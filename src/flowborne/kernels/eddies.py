@@ -33,7 +33,7 @@ def positions(shape: Integers, axis: int, wraps: Three, reach: int) -> Integers:
     """(3, n) what each index along each axis, counted from -reach on, adds to the flat one of an
     edge along `axis`; where there is none inside the domain, so much that the sum is below 0."""
     none = -shape[0] * shape[1] * shape[2]
-    found = np.full((3, shape.max() + 2 * reach + 1), none)
+    found = np.full((3, max(shape[0], shape[1], shape[2]) + 2 * reach + 1), none)
     for a in range(3):
         stride = shape[1] * shape[2] if a == 0 else (shape[2] if a == 1 else 1)
         sides = int(a != axis and wraps[a] == 0)

@@ -16,6 +16,7 @@ import numpy as np
 from flowborne.kernels.arrays import Array, Indices, Integers, Nodes
 from flowborne.kernels.distance import BOX, CYLINDER, Samples, signed_distance
 from flowborne.kernels.jit import inlined, kernel
+from flowborne.kernels.triangles import along
 
 PIECES = 1 << 20
 """Numbers for the smooth pieces of the surface of one geometry."""
@@ -286,7 +287,9 @@ def surface_at(body: Placed, point: Array, shift: float, normal: Array) -> int:
     normal[0] = distance_to(body, x + shift, y, z) - distance_to(body, x - shift, y, z)
     normal[1] = distance_to(body, x, y + shift, z) - distance_to(body, x, y - shift, z)
     normal[2] = distance_to(body, x, y, z + shift) - distance_to(body, x, y, z - shift)
-    normal /= max(np.sqrt((normal**2).sum()), 1e-300)
+    size = max(np.sqrt(along(normal, normal)), 1e-300)
+    for m in range(3):
+        normal[m] /= size
     return piece_of(body.kind, normal @ body.rotation)
 
 

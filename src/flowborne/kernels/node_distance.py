@@ -49,11 +49,12 @@ def lower_to_body(phi: Array, box: Integers, body: Placed, nodes: Nodes) -> None
         x = origin[0] + h * (box[0, 0] + i)
         for j in range(phi.shape[1]):
             y = origin[1] + h * (box[1, 0] + j)
-            for k in range(1 if flat else phi.shape[2]):
+            for k in range(phi.shape[2]):
+                if flat and k > 0:
+                    phi[i, j, k] = phi[i, j, 0]
+                    continue
                 z = 0.0 if flat else origin[2] + h * (box[2, 0] + k)
                 phi[i, j, k] = min(phi[i, j, k], distance_to(body, x, y, z))
-    if flat:
-        phi[:, :, 1:] = phi[:, :, :1]
 
 
 @kernel

@@ -52,7 +52,7 @@ def crossed(a: Point | Array, b: Point | Array) -> Point:
 
 
 @kernel
-def along(a: Point, b: Point | Array) -> float:
+def along(a: Point | Array, b: Point | Array) -> float:
     """a . b."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
