@@ -1,11 +1,13 @@
 """Kernels and their parallel twins."""
 
+import gc
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
 
 import numpy as np
 import pytest
 from numba import prange
+from numba.core import event
 
 from flowborne.kernels import jit
 from flowborne.kernels.jit import LARGE, allowed_threads, kernel, kernel_threads
@@ -86,6 +88,14 @@ def test_several_threads_may_run_twins_at_once(monkeypatch):
 
 def test_kernel_without_a_parallel_loop_has_no_twin():
     assert shift.parallel is shift
+
+
+def test_no_garbage_is_collected_while_a_kernel_compiles():
+    with event.trigger_event("numba:compile"):
+        with event.trigger_event("numba:compile"):
+            assert not gc.isenabled()
+        assert not gc.isenabled()
+    assert gc.isenabled()
 
 
 def test_context_is_left_after_an_error():

@@ -17,6 +17,7 @@ wait for, and a solve of 0.5 s beside another busy process took 9 s.
 from __future__ import annotations
 
 import ctypes
+import gc
 import os
 import sys
 import threading
@@ -31,6 +32,7 @@ os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")  # read when Numba loads Ope
 import numba
 import numpy as np
 from numba import njit
+from numba.core import event
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -202,6 +204,27 @@ def inlined(function: Callable[..., Any]) -> Any:
     return Kernel(function, forceinline=True)
 
 
+class Uncollected(event.Listener):
+    """While a kernel compiles, no garbage is collected: looking time and again through what Numba
+    makes and keeps takes an eighth of the time. One thread compiles at a time."""
+
+    depth, collects = 0, False
+
+    def on_start(self, started: object) -> None:
+        if self.depth == 0:
+            self.collects = gc.isenabled()
+            gc.disable()
+        self.depth += 1
+
+    def on_end(self, ended: object) -> None:
+        self.depth -= 1
+        if self.depth == 0 and self.collects:
+            gc.enable()
+
+
+event.register("numba:compile", Uncollected())
+
+
 @contextmanager
 def compilation_watched(notify: Callable[[int], None]) -> Iterator[None]:
     """Call `notify(n)` when the n-th kernel begins to compile.
@@ -209,7 +232,6 @@ def compilation_watched(notify: Callable[[int], None]) -> Iterator[None]:
     Kernels that come from the cache of an earlier run are not compiled, and nothing is called.
     Calls come from whichever thread compiles.
     """
-    from numba.core import event
 
     class Listener(event.Listener):
         compiled = 0
