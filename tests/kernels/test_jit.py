@@ -1,11 +1,13 @@
 """Kernels and their parallel twins."""
 
+import gc
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
 
 import numpy as np
 import pytest
 from numba import prange
+from numba.core import event
 
 from flowborne.kernels import jit
 from flowborne.kernels.jit import LARGE, allowed_threads, kernel, kernel_threads
@@ -40,8 +42,8 @@ def test_kernels_of_kernels_run_their_twins_inside_the_context_only(monkeypatch)
         with kernel_threads(most):
             quadruple(x)
         np.testing.assert_array_equal(x, expected)
-    assert quadruple.parallel is not quadruple.serial
-    assert quadruple.parallel.py_func.__globals__["double"] is double.parallel
+    assert quadruple.parallel is not quadruple
+    assert quadruple.parallel.__wrapped__.__globals__["double"] is double.parallel
 
 
 @pytest.mark.parametrize("size", [LARGE, LARGE - 1])
@@ -85,7 +87,15 @@ def test_several_threads_may_run_twins_at_once(monkeypatch):
 
 
 def test_kernel_without_a_parallel_loop_has_no_twin():
-    assert shift.parallel is shift.serial
+    assert shift.parallel is shift
+
+
+def test_no_garbage_is_collected_while_a_kernel_compiles():
+    with event.trigger_event("numba:compile"):
+        with event.trigger_event("numba:compile"):
+            assert not gc.isenabled()
+        assert not gc.isenabled()
+    assert gc.isenabled()
 
 
 def test_context_is_left_after_an_error():

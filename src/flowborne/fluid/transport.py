@@ -234,9 +234,10 @@ def damp_eddies(velocity: Faces, transport: Transport, grid: Grid, sides: Bounda
         cut = NONE, *cut[:2]
     rate, found = UPWIND_DAMPING * transport.dt / grid.spacing, []
     for axis in range(1 if grid.is_slab else 3):
-        own = (axis + 1) % 3, (axis + 2) % 3
-        flow, held, listed = (tuple(f[a] for a in own) for f in (fields, volumes, cut))
-        found.append((*flow, held, *exchanges_near(flow, held, listed, axis, wraps, GHOSTS, rate)))
-    for each in found:
-        exchange(*each)
+        a, b = (axis + 1) % 3, (axis + 2) % 3
+        flow, held = (fields[a], fields[b]), (volumes[a], volumes[b])
+        edges = exchanges_near(flow, held, (cut[a], cut[b]), axis, wraps, GHOSTS, rate)
+        found.append((flow, held, edges))
+    for (u, v), held, edges in found:
+        exchange(u, v, held, *edges)
     join_ends(velocity, grid, sides)

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit, prange
+from numba import prange
 
 from flowborne.kernels.arrays import (
     FREE,
@@ -109,7 +109,7 @@ class Inlets(NamedTuple):
     loss: Array
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def share_at_faces(
     cells: Integers, values: tuple[Array, ...], axis: int, shape: Three, ring: int
 ) -> tuple[Integers, Array]:
@@ -161,8 +161,10 @@ class Scratch(NamedTuple):
     nought: Array
 
 
-@njit(nogil=True, cache=True)
-def layer(row: Integers, field: Array, shape: Three) -> tuple[int, int, int, int, int, int, int]:
+@kernel
+def layer(
+    row: Integers, field: Array | Marks, shape: Three
+) -> tuple[int, int, int, int, int, int, int]:
     """Where the layer of a padded field inside a side lies: its first element, the steps outwards
     and along the other two axes, the numbers along them, and along its own."""
     strides, axis, first = np.empty(3, np.int64), row[AXIS], 0
@@ -177,7 +179,7 @@ def layer(row: Integers, field: Array, shape: Three) -> tuple[int, int, int, int
     return first, outward, strides[one], strides[other], shape[one], shape[other], shape[axis]
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def fill_ghosts(field: Array, sides: Sides, time: int, faces: FaceGrid) -> None:
     """Set the two layers of ghosts around a padded field, u_ghost = a u_inside + b, in place;
     corners are left alone.
@@ -207,7 +209,7 @@ def fill_ghosts(field: Array, sides: Sides, time: int, faces: FaceGrid) -> None:
                     flat[at + 2 * out] = factor * flat[at - inward] + b
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def mark_volumes(marks: Marks, cut: Integers, sides: Sides, faces: FaceGrid) -> None:
     """Padded marks of the control volumes: CLEAR where no cut one is among the next GHOSTS along an
     axis, UPSTREAM on a free side of the domain, where means would draw in ever more, else CUT."""
@@ -233,7 +235,7 @@ def mark_volumes(marks: Marks, cut: Integers, sides: Sides, faces: FaceGrid) -> 
                     flat[at_side] = UPSTREAM if row[NORMAL] == FREE else CUT
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def add_side_rates(total: Array, flux: Fluxes, axis: int, listed: Integers, shape: Three) -> None:
     """Add volume per time that leaves listed control volumes through their sides across an axis,
     in place."""
@@ -252,7 +254,7 @@ def add_side_rates(total: Array, flux: Fluxes, axis: int, listed: Integers, shap
             total[n] += max((2 * upper - 1) * rate, 0.0)
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def what_flows_out(exchange: Exchange, listed: Integers, shape: Three) -> Array:
     """(n,) volume per time that leaves listed control volumes through their sides, inlets and
     transfers."""
@@ -273,7 +275,7 @@ def what_flows_out(exchange: Exchange, listed: Integers, shape: Three) -> Array:
     return total
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def cross_sides(sides: Sides, flux: Fluxes, cells: Array, faces: FaceGrid) -> None:
     """Set what comes in through each side with each control volume beside it, and their shares in
     the volume of their layer, in place. The last faces along a periodic axis count as none.
@@ -306,10 +308,11 @@ def cross_sides(sides: Sides, flux: Fluxes, cells: Array, faces: FaceGrid) -> No
                 sides.rate[n] = (1.0 - 2.0 * upper) * through
                 sides.share[n] = held
                 total += held
-        sides.share[first : first + shape[one] * shape[other]] /= max(total, 1e-300)
+        for n in range(first, first + shape[one] * shape[other]):
+            sides.share[n] /= max(total, 1e-300)
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def draw_in(padded: Padded, sides: Sides, shape: Three) -> float:
     """Give what comes in through free sides its velocity, the mean of the layer beside it or one
     without vorticity, in the ghosts of a padded field; gives volume x velocity that comes in
@@ -343,7 +346,7 @@ def draw_in(padded: Padded, sides: Sides, shape: Three) -> float:
     return came
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def hold(u: Array, volume: Array, sides: Sides, time: int, faces: FaceGrid) -> float:
     """Give the faces of inflows across the component their own velocity, in place; gives volume
     times what that changes it by.
@@ -365,7 +368,7 @@ def hold(u: Array, volume: Array, sides: Sides, time: int, faces: FaceGrid) -> f
     return given
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def empty_at_walls(now: Stage, sides: Sides, faces: FaceGrid) -> float:
     """Take from the faces of prescribed sides across the component what is left in control volumes
     that a body has filled, in place; gives what that changes volume times velocity by."""
@@ -384,7 +387,7 @@ def empty_at_walls(now: Stage, sides: Sides, faces: FaceGrid) -> float:
     return given
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def join(u: Array, axis: int) -> None:
     """Make the last layer across an axis the first one, in place."""
     layer, flat = 1, u.reshape(-1)
@@ -405,7 +408,7 @@ def part_of_step(out: Array, start: Array, end: Array, part: float) -> None:
             both[i, k] = one[i, k] + part * (other[i, k] - one[i, k])
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def settle(later: Array, high: Array, volumes: Volumes, leaving: Array, nought: Array) -> None:
     """Give what closed control volumes got to their targets, and mix what is too small, in place.
 
@@ -427,7 +430,7 @@ def settle(later: Array, high: Array, volumes: Volumes, leaving: Array, nought: 
     fill_and_follow(later, high, volumes, volumes.shut)
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def fill_and_follow(u: Array, held: Array, volumes: Volumes, shut: Closed) -> None:
     """Give control volumes that hold nothing the velocity around them, closed ones that of their
     targets, and the last ones of a periodic axis that of the first ones, in place."""
@@ -437,7 +440,7 @@ def fill_and_follow(u: Array, held: Array, volumes: Volumes, shut: Closed) -> No
         join(u, volumes.faces.component)
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def pass_inlets(now: Stage, padded: Array, inlets: Inlets, own: Array) -> None:
     """Let through inlets what they bring to a padded field after a stage, in place.
 

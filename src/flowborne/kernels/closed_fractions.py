@@ -9,7 +9,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from flowborne.kernels.arrays import PERIODIC, PRESCRIBED, Array, Faces, Integers, Nodes
 from flowborne.kernels.cut_faces import (
@@ -22,7 +21,8 @@ from flowborne.kernels.cut_faces import (
     other_axes,
 )
 from flowborne.kernels.edge_crossings import Crossings
-from flowborne.kernels.jit import inlined
+from flowborne.kernels.jit import inlined, kernel
+from flowborne.kernels.triangles import along
 
 Index = tuple[int, int, int]
 
@@ -53,7 +53,7 @@ class Piece(NamedTuple):
     centre: Faces
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def close_faces(piece: Piece, total: Array, axis: int) -> None:
     """What one body alone closes of each face across `axis` in its box, in place; added to `total`,
     too."""
@@ -81,7 +81,7 @@ def closed_part(
     return closed
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def count_beside(beside: Integers, phi: Array, box: Integers, count: int) -> None:
     """Add `count` to the cells of which one body covers a corner."""
     for i in range(box[0, 0], box[0, 1] - 1):
@@ -98,7 +98,7 @@ def count_beside(beside: Integers, phi: Array, box: Integers, count: int) -> Non
                     beside[i, j, k] += count
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def in_a_crease(beside: Integers, axis: int, i: int, j: int, k: int, ring: bool) -> bool:
     """Whether two bodies, or a body and a side, bound one of the cells at face (i, j, k).
 
@@ -113,7 +113,7 @@ def in_a_crease(beside: Integers, axis: int, i: int, j: int, k: int, ring: bool)
     return False
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def share_closed(
     piece: Piece, opened: Array, total: Array, distance: Array, found: Crossings,
     beside: Integers, axis: int, ends: Integers,
@@ -157,12 +157,12 @@ def share_closed(
                 share[a, b, c] = union * own / all_own
                 if share[a, b, c] > 0.0:
                     faces[count], part[count] = (i * nj + j) * nk + k, share[a, b, c]
-                    middle[count] = centre[:, a, b, c]
+                    middle[count, 0], middle[count, 1] = centre[0, a, b, c], centre[1, a, b, c]
                     count += 1
     return faces[:count], part[:count], middle[:count]
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def wall_point(
     distance: Array, found: Crossings, i: int, j: int, k: int, point: Array, scratch: Array
 ) -> bool:
@@ -191,7 +191,8 @@ def wall_point(
                 middle[s] += x
                 middle[t] += y
     if corners > 0:
-        point[:] = middle / corners
+        for m in range(3):
+            point[m] = middle[m] / corners
         return True
     count, rise = 0, 0.0
     for d in range(3):
@@ -215,13 +216,13 @@ def wall_point(
                         rise += found.normal[e, m] * place[m]
     if count == 0:
         return False
-    rise = (rise - (mean * middle).sum() / count) / max(np.sqrt((mean**2).sum()), 1e-300) / count
+    rise = (rise - along(mean, middle) / count) / max(np.sqrt(along(mean, mean)), 1e-300) / count
     for m in range(3):
         point[m] = min(max(middle[m] / count + 0.75 * rise * mean[m], 0.0), 1.0)
     return True
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def open_cells(
     volume: Array, whole: float, distance: Array, found: Crossings, opened: Faces, boxes: Integers
 ) -> None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit, prange
+from numba import prange
 
 from flowborne.kernels.arrays import PERIODIC, PRESCRIBED, Array, FaceGrid, Integers, Marks, Three
 from flowborne.kernels.faces import mean_row
@@ -113,13 +113,13 @@ def cell_beside(at: tuple[int, int, int], upper: int, faces: FaceGrid) -> int:
     return int((i * n1 + j) * (n2 - 1) + place)
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def neighbour(shape: Three | Integers, wraps: Three | Integers, f: int, way: int) -> int:
     """Flat index of one control volume beside f; `way` as in `all_beside`."""
     return int(all_beside(shape, wraps, f)[way])
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def place_of(listed: Integers, f: int, near: int) -> int:
     """Place of the first of a list in ascending order that is not below f; quick where that is a
     little after the place `near`."""
@@ -139,7 +139,7 @@ def place_of(listed: Integers, f: int, near: int) -> int:
     return low
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def merged(one: Integers, other: Integers) -> tuple[Integers, Integers, Integers]:
     """What is in one of two lists in ascending order or in both, in one such list; and where in it
     the elements of each are."""
@@ -159,7 +159,7 @@ def merged(one: Integers, other: Integers) -> tuple[Integers, Integers, Integers
     return found[:count].copy(), first, second
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def find_targets(
     small: Integers,
     kinds: Marks,
@@ -242,7 +242,7 @@ def find_targets(
     return Closed(small[order], targets[order], parts[order])
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def merge_small(amount: Array, closed: Closed) -> Array:
     """Give the targets of closed ones their shares of what these have of an amount, in place; gives
     what (n, 6) each target got."""
@@ -258,7 +258,7 @@ def merge_small(amount: Array, closed: Closed) -> Array:
     return given
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def join_small(field: Array, volumes: Array, closed: Closed, nothing: float) -> None:
     """Give the targets of closed ones their shares of what these hold, and of their volumes, in
     place.
@@ -282,7 +282,7 @@ def join_small(field: Array, volumes: Array, closed: Closed, nothing: float) -> 
             flat[h] = amount / (volume[h] if volume[h] > nothing else 1.0)
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def fill_empty(
     field: Array, volumes: Array, listed: Integers, nothing: float, faces: FaceGrid
 ) -> None:
@@ -301,7 +301,7 @@ def fill_empty(
             flat[f] = total / weight
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def level(
     field: Array,
     volumes: Array,
@@ -356,7 +356,7 @@ def level(
     total[found[1, :count]] = 0.0
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def share_velocity(field: Array, closed: Closed) -> None:
     """Give closed ones the velocity of all that goes with them, in place: their shares with their
     targets."""
@@ -368,7 +368,7 @@ def share_velocity(field: Array, closed: Closed) -> None:
         flat[small[n]] = (1.0 - shares[n].sum()) * flat[small[n]] + shared
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def mark_cut(marks: Marks, listed: Integers, shape: Three, wraps: Three, reach: int) -> None:
     """Set to 0 the marks, padded or not, of listed places of a field of this shape, and of those up
     to `reach` beyond them along each axis, in place."""
@@ -473,7 +473,7 @@ def sort_faces(
         counts[row, 0], counts[row, 1], counts[row, 2] = parts, shut, uneven
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def listed_kinds(kinds: Marks, counts: Integers) -> tuple[Integers, Integers, Integers]:
     """Flat indices of the faces that are PART, SHUT and UNEVEN, see `sort_faces`."""
     flat, width, total = kinds.reshape(-1), kinds.shape[2], np.zeros(3, np.int64)

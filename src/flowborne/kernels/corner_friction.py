@@ -15,7 +15,6 @@ cell. Along an edge in a room it holds in the plane across the axis that the edg
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from flowborne.kernels.arrays import Array, Integers
 from flowborne.kernels.cut_faces import (
@@ -27,7 +26,7 @@ from flowborne.kernels.cut_faces import (
     values_at,
 )
 from flowborne.kernels.edge_crossings import Crossings
-from flowborne.kernels.jit import inlined
+from flowborne.kernels.jit import inlined, kernel
 from flowborne.kernels.viscosity import LEAST, UNKNOWN, CutFaces, nearest_node
 
 SHARP = np.cos(np.radians(20.0))
@@ -41,7 +40,7 @@ AROUND = FLUX
 """How many faces."""
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def corner_on(
     distance: Array, found: Crossings, axis: int, i: int, j: int, k: int, corner: Array,
     scratch: Integers,
@@ -70,7 +69,7 @@ def corner_on(
     return closed > closed_face(distance, found, axis, i, j, k, flat, True)[0]
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def find_corners(distance: Array, found: Crossings, h: float) -> tuple[Integers, Array]:
     """Cells of size h that one sharp convex edge of a body passes from one face to that opposite.
 
@@ -120,7 +119,7 @@ def add_square(form: Array, weight: float, terms: tuple[tuple[int, float], ...])
             form[i, j] += weight * x * y
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def eliminate(form: Array, last: int) -> None:
     """Give the last velocity the value for which a quadratic form is least, in place."""
     if form[last, last] > 0.0:
@@ -129,7 +128,7 @@ def eliminate(form: Array, last: int) -> None:
                 form[i, j] -= form[i, last] * form[last, j] / form[last, last]
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def corner_form(
     narrow: float, beyond: float, volume: float, b: float, h: float, stays: bool,
     links: tuple[float, float, float], walls: tuple[float, float],
@@ -212,7 +211,7 @@ def wall_at(beside: Integers, wall: Array, f: int) -> float:
     return wall[n] if n < beside.size and beside[n] == f else 0.0
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def corner_stiffness(
     known: CutFaces, cells: Integers, corner: Array, links: Array, beside: Integers, wall: Array,
     wraps: Integers,

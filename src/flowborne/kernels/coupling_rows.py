@@ -6,11 +6,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from flowborne.kernels.arrays import PRESCRIBED, Array, Integers, Kinds, Mask, Rows
 from flowborne.kernels.closed_fractions import Piece
-from flowborne.kernels.jit import inlined
+from flowborne.kernels.jit import inlined, kernel
 
 ENCLOSED, COVERED, NARROW, WIDE = 0, 1, 2, 3
 """Kinds of cells: closed in by bodies and solid sides of the domain; all faces closed by bodies; an
@@ -43,7 +42,7 @@ def through(normal: Integers, axis: int, end: int, at_end: bool) -> float:
     return 0.0 if at_end and normal[axis, end] == PRESCRIBED else 1.0
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def kinds_of_cells(ox: Array, oy: Array, oz: Array, normal: Integers, boxes: Integers) -> Kinds:
     """(nx, ny, nz) kind of each cell; WIDE outside boxes of nodes (n, 3, 2), where all faces are
     open.
@@ -76,7 +75,7 @@ def kinds_of_cells(ox: Array, oy: Array, oz: Array, normal: Integers, boxes: Int
     return kind
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def cell_wrench(wrench: Array, i: int, j: int, k: int, piece: Piece) -> None:
     """Wrench of unit pressure in cell (i, j, k) on the body: what acts on a closed part of a face
     acts at its centre."""
@@ -104,7 +103,7 @@ def cell_wrench(wrench: Array, i: int, j: int, k: int, piece: Piece) -> None:
             wrench[4] -= (x + h * cz[0, a, b, c + side]) * f
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def list_cells(piece: Piece, listed: Mask) -> tuple[Integers, Array]:
     """Listed cells (n,) with a coupling row of one body, flat, and (n, 6) its values, the wrench of
     unit pressure. Where the body closes as much on either side of a cell, at the same place, it has
@@ -129,7 +128,7 @@ def list_cells(piece: Piece, listed: Mask) -> tuple[Integers, Array]:
     return cells[:at], values[:at]
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def flesh_rows(
     axis: Integers,
     at: Integers,
@@ -177,7 +176,7 @@ Motion = tuple[Array, Array]
 """(nbody, 6) twist of the bodies, (n, 3) velocity of the vertices of flesh."""
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def add_body_velocity(out: Array, axis: int, parts: ClosedParts, motion: Motion) -> None:
     """Add closed part x body velocity on the faces across `axis`, at the centres of the parts."""
     twist, flesh = motion
@@ -199,7 +198,7 @@ def add_body_velocity(out: Array, axis: int, parts: ClosedParts, motion: Motion)
         flat_out[f] += closed[n] * velocity
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def carried_at(
     faces: Integers, u: Array, axis: int, opened: Array, parts: ClosedParts, motion: Motion
 ) -> Array:
@@ -212,7 +211,7 @@ def carried_at(
     return found
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def fill_empty_faces(
     faces: Integers, u: Array, axis: int, held: Array, opened: Array, parts: ClosedParts,
     motion: Motion,
@@ -224,7 +223,7 @@ def fill_empty_faces(
             u.reshape(-1)[f] = found[f]
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def fastest_closed(u: Array, axis: int, opened: Array, parts: ClosedParts, motion: Motion) -> float:
     """Largest size of `carried_at` on the faces across `axis` that bodies close in part."""
     faces, most = parts.face[parts.axis == axis], 0.0

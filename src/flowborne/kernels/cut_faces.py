@@ -8,11 +8,10 @@ it is the arc of a circle, which here is a polygon of the same area.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from flowborne.kernels.arrays import Array, Integers
 from flowborne.kernels.edge_crossings import PIECES, Crossings
-from flowborne.kernels.jit import inlined
+from flowborne.kernels.jit import inlined, kernel
 
 SAME = 1e-9
 """Open parts of faces that differ by less are the same: one below it is closed."""
@@ -25,7 +24,7 @@ Place = tuple[float, float]
 Four = tuple[float, float, float, float]
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def other_axes(axis: int) -> tuple[int, int]:
     """The two others in their order."""
     return int(axis == 0), 2 - int(axis == 2)
@@ -111,7 +110,7 @@ def corner_of(n: int) -> Place:
     return int(n == 1 or n == 2) - 0.5, int(n >= 2) - 0.5
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def wall_between(p: Place, q: Place, m: Place, n: Place, smooth: bool) -> tuple[float, float, bool]:
     """The point in the unit square about the origin by way of which a wall goes from p to q, with
     the body on its left; whether it is a corner.
@@ -158,7 +157,7 @@ def between(p: Place, q: Place, part: float) -> Place:
     return p[0] + part * (q[0] - p[0]), p[1] + part * (q[1] - p[1])
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def add_wall(
     sums: Array, p: Place, q: Place, e: int, f: int, found: Crossings, axes: tuple[int, int],
     straight: bool,
@@ -183,7 +182,7 @@ def add_wall(
     return int(kink)
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def crossings_on(values: Four, crossing: tuple[int, int, int, int], out: Integers) -> int:
     """Write the numbers of the crossings around a face to `out`, -1 where one is not known; gives
     how many there are.
@@ -227,7 +226,7 @@ def on_several_pieces(phi: Array, found: Crossings, axis: int, i: int, j: int, k
     return False
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def closed_face(
     phi: Array, found: Crossings, axis: int, i: int, j: int, k: int, flat: bool, straight: bool
 ) -> tuple[float, float, float, int, float, float]:

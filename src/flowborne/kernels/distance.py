@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from flowborne.kernels.arrays import Array, Point
+from flowborne.kernels.jit import kernel
 
 SPHERE, CAPSULE, CYLINDER, BOX, ELLIPSOID, MESH = range(6)
 
@@ -25,7 +25,7 @@ class Samples(NamedTuple):
     values: Array
 
 
-@njit(nogil=True, cache=True, inline="never")
+@kernel
 def distance_to_box(x: float, y: float, z: float, a: float, b: float, c: float) -> float:
     """Signed distance of (x, y, z) to the box of half extents a, b, c."""
     dx, dy, dz = abs(x) - a, abs(y) - b, abs(z) - c
@@ -33,7 +33,7 @@ def distance_to_box(x: float, y: float, z: float, a: float, b: float, c: float) 
     return float(outside + min(max(dx, dy, dz), 0.0))
 
 
-@njit(nogil=True, cache=True, inline="never")
+@kernel
 def distance_to_ellipsoid(x: float, y: float, z: float, a: float, b: float, c: float) -> float:
     """Distance to the ellipsoid of semi-axes a, b, c, exact to first order at the surface."""
     k0 = np.sqrt((x / a) ** 2 + (y / b) ** 2 + (z / c) ** 2)
@@ -43,7 +43,7 @@ def distance_to_ellipsoid(x: float, y: float, z: float, a: float, b: float, c: f
     return float(k0 * (k0 - 1.0) / k1)
 
 
-@njit(nogil=True, cache=True, inline="never")
+@kernel
 def distance_in_samples(x: float, y: float, z: float, samples: Samples) -> float:
     """Linear between samples of a distance; beyond them the way to them is added."""
     corner, pitch, values = samples
@@ -68,7 +68,7 @@ def distance_in_samples(x: float, y: float, z: float, samples: Samples) -> float
     return float(value + away)
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def signed_distance(kind: int, size: Array, point: Point, samples: Samples) -> float:
     """Signed distance of a point in the geometry's frame, negative inside, m."""
     x, y, z = point
@@ -87,7 +87,7 @@ def signed_distance(kind: int, size: Array, point: Point, samples: Samples) -> f
     return distance_in_samples(x, y, z, samples)
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def distances(kind: int, size: Array, points: Array) -> Array:
     """(n,) signed distances of points (n, 3) in the geometry's frame, exact for an ellipsoid, m."""
     none, distance = Samples(np.zeros(3), 1.0, np.zeros((1, 1, 1))), np.empty(len(points))
@@ -100,7 +100,7 @@ def distances(kind: int, size: Array, points: Array) -> Array:
     return distance
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def distance_off_ellipsoid(point: Array, semi: Array) -> float:
     """Signed distance of a point to an ellipsoid about the origin, m (Eberly 2013).
 

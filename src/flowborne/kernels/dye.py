@@ -19,7 +19,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit, prange
+from numba import prange
 
 from flowborne.kernels.arrays import ROUNDING, Array, Faces, Integers, Marks, Three
 from flowborne.kernels.control_volumes import both_beside, indices, place_of, stride
@@ -66,6 +66,13 @@ def bend_row(
         held_high -= min(off, 2.0 * down)
         low[k] = clear[k] * (part * rise if smooth else held_low)
         high[k] = clear[k] * (part * fall if smooth else held_high)
+
+
+@inlined
+def copy(to: Array, row: Array) -> None:
+    """Write a row over another."""
+    for k in range(row.size):
+        to[k] = row[k]
 
 
 @inlined
@@ -118,12 +125,10 @@ def sweep(
         marks, c = clear[i, :, strip], np.empty((n + 4, w))
         v, free = np.ones((n + 2, w)), np.empty(w)
         for j in range(n):
-            line, row = lines[j], c[j + 2]
-            for k in range(w):
-                row[k] = line[k]
+            copy(c[j + 2], lines[j])
         for j in range(2):
-            c[j] = c[n + j] if wraps else ends[0, i, strip]
-            c[n + 2 + j] = c[2 + j] if wraps else ends[1, i, strip]
+            copy(c[j], c[n + j] if wraps else ends[0, i, strip])
+            copy(c[n + 2 + j], c[2 + j] if wraps else ends[1, i, strip])
         low, high, even = np.zeros((n + 2, w)), np.zeros((n + 2, w)), 0
         steady = np.ones(n + 2, np.bool_)  # nothing but the volume changes between two such rows
         for j in range(n + 4):
@@ -132,20 +137,20 @@ def sweep(
                 same &= row[k] == before
             even, at = even + 1 if same else 0, j - 3
             if j >= 4 and even < 5:  # in the middle of five equal rows parabolas are flat
-                n0, n1, n2, n3, mark = c[j - 4], c[j - 3], c[j - 2], c[j - 1], marks[at - 1]
-                for k in range(w):
-                    free[k] = mark[k]
+                n0, n1, n2, n3 = c[j - 4], c[j - 3], c[j - 2], c[j - 1]
+                copy(free, marks[at - 1])
                 bend_row(low[at], high[at], n0, n1, n2, n3, row, free, least, most)
                 steady[at] = False
         if wraps:
-            low[0], high[0], low[n + 1], high[n + 1] = low[n], high[n], low[1], high[1]
+            for rise in (low, high):
+                copy(rise[0], rise[n])
+                copy(rise[n + 1], rise[1])
             steady[0], steady[n + 1] = steady[n], steady[1]
         for j in range(n):
             if not (steady[j] and steady[j + 1] and steady[j + 2]):
-                held, row = room[j], v[j + 1]
-                for k in range(w):
-                    row[k] = held[k]
-        v[0], v[n + 1] = v[n], v[1]
+                copy(v[j + 1], room[j])
+        copy(v[0], v[n])
+        copy(v[n + 1], v[1])
         flow, amount, calm = np.empty((2, w)), np.empty((2, w)), False
         for j in range(n + 1):
             q, now, was = through[j], flow[j % 2], flow[(j + 1) % 2]
@@ -174,7 +179,7 @@ def sweep(
                     line[k] = min(max(old[k] + gain, least), most)
                     held[k] = left
             if j == 0 or j == n:
-                crossed[min(j, 1), i, strip] = more
+                copy(crossed[min(j, 1), i, strip], more)
     return crossed
 
 
@@ -235,7 +240,7 @@ class CutCells(NamedTuple):
     out: Array
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def face_of(shape: Three | Integers, axis: int, f: int, upper: int) -> int:
     """Flat index of the lower or upper face of cell f among the faces across an axis."""
     i, j, _ = indices(shape, f)
@@ -243,7 +248,7 @@ def face_of(shape: Three | Integers, axis: int, f: int, upper: int) -> int:
     return int(f + (before + upper) * stride(shape, axis))
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def list_flows(cells: CutCells, axis: int, flux: Array, wraps: Three, shape: Three) -> None:
     """Take the faces of cut cells across an axis out of the fluxes, and write what is beside and
     leaves there.
@@ -271,7 +276,7 @@ def list_flows(cells: CutCells, axis: int, flux: Array, wraps: Three, shape: Thr
                 through[face_of(shape, axis, to, 1 - upper)] = 0.0
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def pass_on(
     field: Array,
     volume: Array,

@@ -22,18 +22,18 @@ across the axis in uncut cells, of which each is the opposite of the four beside
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from flowborne.kernels.arrays import Array, Indices, Integers
+from flowborne.kernels.arrays import Array, Indices, Integers, Three
 from flowborne.kernels.control_volumes import indices, stride
+from flowborne.kernels.jit import kernel
 
 
-@njit(nogil=True, cache=True)
-def positions(shape: Integers, axis: int, wraps: Integers, reach: int) -> Integers:
+@kernel
+def positions(shape: Integers, axis: int, wraps: Three, reach: int) -> Integers:
     """(3, n) what each index along each axis, counted from -reach on, adds to the flat one of an
     edge along `axis`; where there is none inside the domain, so much that the sum is below 0."""
     none = -shape[0] * shape[1] * shape[2]
-    found = np.full((3, shape.max() + 2 * reach + 1), none)
+    found = np.full((3, max(shape[0], shape[1], shape[2]) + 2 * reach + 1), none)
     for a in range(3):
         sides = int(a != axis and wraps[a] == 0)
         for n in range(found.shape[1]):
@@ -43,9 +43,9 @@ def positions(shape: Integers, axis: int, wraps: Integers, reach: int) -> Intege
     return found
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def list_edges(
-    number: Indices, cut: tuple[Integers, Integers], axis: int, wraps: Integers, reach: int
+    number: Indices, cut: tuple[Integers, Integers], axis: int, wraps: Three, reach: int
 ) -> Integers:
     """Flat indices (n,) of edges inside the domain around which a face is cut or up to `reach`
     faces away from a cut one along an axis; their numbers are set to 1.
@@ -77,13 +77,13 @@ def list_edges(
     return found[:count].copy()
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def edges_near(
     number: Indices,
     volumes: tuple[Array, Array],
     cut: tuple[Integers, Integers],
     axis: int,
-    wraps: Integers,
+    wraps: Three,
     reach: int,
 ) -> tuple[Integers, Integers, Array]:
     """Edges of `list_edges` with four open faces: (n, 4) those faces, u below and above, v below
@@ -128,7 +128,7 @@ def edges_near(
     return faces[:kept], beside[:kept], least[:kept]
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def exchanges(
     u: Array, v: Array, faces: Integers, beside: Integers, least: Array, rate: float
 ) -> Array:
@@ -157,13 +157,13 @@ def exchanges(
     return given
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def exchanges_near(
     flow: tuple[Array, Array],
     volumes: tuple[Array, Array],
     cut: tuple[Integers, Integers],
     axis: int,
-    wraps: Integers,
+    wraps: Three,
     reach: int,
     rate: float,
 ) -> tuple[Integers, Integers, Array]:
@@ -176,7 +176,7 @@ def exchanges_near(
     return faces, beside, exchanges(u, v, faces, beside, least, rate)
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def exchange(
     u: Array, v: Array, volumes: tuple[Array, Array], faces: Integers, beside: Integers,
     given: Array,

@@ -12,11 +12,11 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from flowborne.kernels.arrays import Array, Indices, Integers, Nodes
 from flowborne.kernels.distance import BOX, CYLINDER, Samples, signed_distance
-from flowborne.kernels.jit import inlined
+from flowborne.kernels.jit import inlined, kernel
+from flowborne.kernels.triangles import along
 
 PIECES = 1 << 20
 """Numbers for the smooth pieces of the surface of one geometry."""
@@ -76,7 +76,7 @@ def distance_to(body: Placed, x: float, y: float, z: float) -> float:
     return signed_distance(body.kind, body.size, (lx, ly, lz), body.samples)
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def most_crossings(phi: Array, h: float, flat: bool) -> int:
     """How often edges may be crossed: once between a node inside and one that is not, twice between
     two open ones that are together nearer to the body than to each other, but for rounding."""
@@ -108,7 +108,7 @@ def together(shape: tuple[int, ...], each: Sequence[Crossings]) -> Crossings:
     return Crossings(np.full((3, *shape), -1, np.int32), *lists)
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def add_crossing(
     found: Crossings, used: Integers, edge: tuple[int, int, int, int], twice: bool, upper: bool,
     part: float, normal: Array, piece: int,
@@ -132,7 +132,7 @@ def add_crossing(
         found.normal[n] = normal
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def cross_geometry(
     found: Crossings, used: Integers, phi: Array, box: Integers, body: Placed, number: int,
     nodes: Nodes,
@@ -179,7 +179,7 @@ def cross_geometry(
                             add_crossing(found, used, edge, twice, at_upper, part, normal, piece)
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def dip(body: Placed, point: Array, d: int, h: float) -> float:
     """How far along the edge of length h from a point there is a place inside, m; 0 for none.
 
@@ -210,7 +210,7 @@ def dip(body: Placed, point: Array, d: int, h: float) -> float:
     return 0.0
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def merge_crossings(
     at: Indices, part: Array, distance: Array, own: Indices, phi: Array,
     box: Integers, first: int,
@@ -248,7 +248,7 @@ def merge_crossings(
                     at[d, a, b, c] = n
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def root(body: Placed, point: Array, d: int, step: float, tolerance: float) -> float:
     """Part of the way from a point along axis d at which the distance is 0, by the Illinois method;
     the point moves there. -1 when the way does not end inside.
@@ -280,18 +280,20 @@ def root(body: Placed, point: Array, d: int, step: float, tolerance: float) -> f
     return float(s)
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def surface_at(body: Placed, point: Array, shift: float, normal: Array) -> int:
     """Number of the smooth piece of the surface at a point; its normal is written to `normal`."""
     x, y, z = point
     normal[0] = distance_to(body, x + shift, y, z) - distance_to(body, x - shift, y, z)
     normal[1] = distance_to(body, x, y + shift, z) - distance_to(body, x, y - shift, z)
     normal[2] = distance_to(body, x, y, z + shift) - distance_to(body, x, y, z - shift)
-    normal /= max(np.sqrt((normal**2).sum()), 1e-300)
+    size = max(np.sqrt(along(normal, normal)), 1e-300)
+    for m in range(3):
+        normal[m] /= size
     return piece_of(body.kind, normal @ body.rotation)
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def piece_of(kind: int, normal: Array) -> int:
     """Number of the smooth piece that has a normal in the geometry's frame."""
     if kind == BOX:

@@ -9,7 +9,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from flowborne.kernels.arrays import Array, FaceGrid, Faces, Integers, Marks, Three
 from flowborne.kernels.control_volumes import (
@@ -77,7 +76,7 @@ def face_between(
     return int((i * across[1] + j) * across[2] + k)
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def openings(
     listed: Integers,
     kinds: Marks,
@@ -130,7 +129,7 @@ def openings(
     return Openings(above, way, rest)
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def even_out(
     held: Array,
     goal: Array,
@@ -184,7 +183,7 @@ def even_out(
         gained[n] += more[n]
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def give(now: Stage, f: int, more: float) -> None:
     """Let more of its amount per time leave one control volume after a stage, flat, in place."""
     now.kept[f] -= 0.5 * now.dt * more
@@ -192,7 +191,7 @@ def give(now: Stage, f: int, more: float) -> None:
     now.later[f] -= now.weight * now.dt * more / volume
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def add_transfers(now: Stage, field: Array, given: Transfers) -> None:
     """Let what transfers take leave control volumes and come to others after a stage, in place:
     volume per time x mean velocity of both, which changes no energy.
@@ -207,7 +206,7 @@ def add_transfers(now: Stage, field: Array, given: Transfers) -> None:
         give(flat, g, -passed)
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def with_neighbours(cut: Integers, kinds: Marks, faces: FaceGrid) -> Integers:
     """The listed ones, and then those beside them on which pressure acts.
 
@@ -227,7 +226,7 @@ def with_neighbours(cut: Integers, kinds: Marks, faces: FaceGrid) -> Integers:
     return found[:count].copy()
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def share_out(
     volume: Array,
     closed: Closed,

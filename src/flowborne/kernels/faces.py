@@ -6,16 +6,16 @@ Sums and maxima run plane after plane, so that they do not depend on how many th
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
+from numba import prange
 
 from flowborne.kernels.arrays import Array
-from flowborne.kernels.jit import kernel
+from flowborne.kernels.jit import inlined, kernel
 
 LANES = 64
 """Partial sums that a plane is added up in, so that the compiler makes vector code of it."""
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def mean_row(row: Array, cells: Array, i: int, j: int, axis: int, periodic: bool) -> None:
     """Means of both cells of each face of row (i, j) across `axis`; 0 beyond the ends of an axis
     that is not periodic."""
@@ -39,7 +39,7 @@ def mean_row(row: Array, cells: Array, i: int, j: int, axis: int, periodic: bool
             row[k] = first * one[k] + second * other[k]
 
 
-@njit(forceinline=True, nogil=True, cache=True)
+@inlined
 def flat(values: Array) -> Array:
     """The same field with its planes in line, so that a slab's rows are long as well."""
     return values.reshape((values.shape[0], values.shape[1] * values.shape[2]))

@@ -17,12 +17,13 @@ wait for, and a solve of 0.5 s beside another busy process took 9 s.
 from __future__ import annotations
 
 import ctypes
+import gc
 import os
 import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from functools import cache
+from functools import cache, cached_property
 from types import FunctionType
 from typing import Any, Generic, ParamSpec, TypeVar, cast
 
@@ -30,17 +31,11 @@ os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")  # read when Numba loads Ope
 
 import numba
 import numpy as np
-from numba import njit as njit
-from numba import prange as prange
+from numba import njit
+from numba.core import event
 
 P = ParamSpec("P")
 R = TypeVar("R")
-
-inlined = njit(forceinline=True, nogil=True, cache=True, error_model="numpy")
-"""For what is called at every cell or face: inlined by LLVM, which compiles far sooner than by
-Numba. What goes through a row or a plane is a kernel: inlined, it would be compiled anew at every
-place that calls it, and once more in all that these are called from. A division by 0 gives what
-IEEE says, here and in kernels: loops that stop at one are not vectorised."""
 
 ONLY_PRANGE = {
     "comprehension": False,
@@ -139,69 +134,95 @@ def numba_threads(count: int) -> Iterator[bool]:
             _workqueue.release()
 
 
-class Kernel(Generic[P, R]):
-    """A function compiled twice: serial, and parallel when first asked for.
+def compiled(function: FunctionType, **options: Any) -> Any:
+    """By Numba when first called. A division by 0 gives what IEEE says: loops that stop at one are
+    not vectorised. There is no entry for C."""
+    return njit(nogil=True, error_model="numpy", no_cfunc_wrapper=True, **options)(function)
 
-    Other kernels may call it. Inside a parallel twin every kernel is called by its twin.
+
+class Kernel(Generic[P, R]):
+    """A function that is compiled when first called, once for Python, kept on disc, and once for
+    other kernels: the entry from Python takes longer to compile than most functions.
+
+    Inside a parallel twin every kernel is called by its twin.
     """
 
-    def __init__(self, function: Callable[P, R]) -> None:
+    def __init__(self, function: Callable[P, R], **options: Any) -> None:
         assert isinstance(function, FunctionType)
         self.__doc__ = function.__doc__
         self.__name__ = function.__name__
         self.__wrapped__ = function
-        self.serial: Any = njit(nogil=True, cache=True, error_model="numpy")(function)
-        self._twin: Any = None
+        self.options = options
+        self.outer = compiled(function, cache=True, **options)
+        self.inner = compiled(function, no_cpython_wrapper=True, **options)
 
     def __call__(self, *args: P.args, **kwargs: P.kwargs) -> R:
-        count = allowed_threads()
-        if count == 1 or largest_size(args) < LARGE or self.parallel is self.serial:
-            found: R = self.serial(*args, **kwargs)
-            return found
+        count = getattr(_thread, "most", 1)
+        if count == 1 or self.parallel is self or largest_size(args) < LARGE:
+            return cast(R, self.outer(*args, **kwargs))
         with numba_threads(count) as free:
-            version = self.parallel if free else self.serial
-            return cast(R, version(*args, **kwargs))
+            version = self.parallel if free else self
+            return cast(R, version.outer(*args, **kwargs))
 
     @property
     def _numba_type_(self) -> Any:
-        """Numba's type of the serial version: what a call from another kernel compiles against."""
-        return self.serial._numba_type_
+        """Numba's type of the function: what a call from another kernel compiles against."""
+        return self.inner._numba_type_
 
-    @property
-    def parallel(self) -> Any:
-        """The parallel twin; the serial version where neither it nor what it calls has a prange.
+    @cached_property
+    def parallel(self) -> Kernel[P, R]:
+        """The parallel twin; the kernel itself where neither it nor what it calls has a prange.
 
         The twin is a copy under another name, because Numba's cache on disc would take one for the
         other, and sees the twins of the kernels that it calls.
         """
-        if self._twin is None:
-            function = self.__wrapped__
-            names = function.__code__.co_names
-            called = {
-                name: function.__globals__[name]
-                for name in names
-                if isinstance(function.__globals__.get(name), Kernel)
-            }
-            twins = {name: other.parallel for name, other in called.items()}
-            changed = any(twins[name] is not called[name].serial for name in twins)
-            if "prange" not in names and not changed:
-                self._twin = self.serial
-            else:
-                name = function.__name__ + "_parallel"
-                names_there = {**function.__globals__, **twins}
-                copy = FunctionType(function.__code__, names_there, name, function.__defaults__)
-                copy.__qualname__ = name
-                copy.__module__ = function.__module__
-                option = ONLY_PRANGE if "prange" in names else False
-                self._twin = njit(nogil=True, cache=True, error_model="numpy", parallel=option)(
-                    copy
-                )
-        return self._twin
+        function = self.__wrapped__
+        names = function.__code__.co_names
+        found = {name: function.__globals__.get(name) for name in names}
+        called = {name: other for name, other in found.items() if isinstance(other, Kernel)}
+        twins = {name: other.parallel for name, other in called.items()}
+        if "prange" not in names and twins == called:
+            return self
+        there, name = {**function.__globals__, **twins}, function.__name__ + "_parallel"
+        copy = FunctionType(function.__code__, there, name, function.__defaults__)
+        copy.__qualname__, copy.__module__ = name, function.__module__
+        spread = ONLY_PRANGE if "prange" in names else False
+        twin: Kernel[P, R] = Kernel(copy, **self.options, parallel=spread)
+        twin.parallel = twin
+        return twin
 
 
 def kernel(function: Callable[P, R]) -> Kernel[P, R]:
     """Decorator of module-level functions on plain arrays; see the module."""
     return Kernel(function)
+
+
+def inlined(function: Callable[..., Any]) -> Any:
+    """For what is called at every cell or face: inlined by LLVM, which compiles far sooner than by
+    Numba. What goes through a row or a plane is a kernel: inlined, it would be compiled anew at
+    every place that calls it, and once more in all that these are called from."""
+    return Kernel(function, forceinline=True)
+
+
+class Uncollected(event.Listener):
+    """While a kernel compiles, no garbage is collected: looking time and again through what Numba
+    makes and keeps takes an eighth of the time. One thread compiles at a time."""
+
+    depth, collects = 0, False
+
+    def on_start(self, started: object) -> None:
+        if self.depth == 0:
+            self.collects = gc.isenabled()
+            gc.disable()
+        self.depth += 1
+
+    def on_end(self, ended: object) -> None:
+        self.depth -= 1
+        if self.depth == 0 and self.collects:
+            gc.enable()
+
+
+event.register("numba:compile", Uncollected())
 
 
 @contextmanager
@@ -211,7 +232,6 @@ def compilation_watched(notify: Callable[[int], None]) -> Iterator[None]:
     Kernels that come from the cache of an earlier run are not compiled, and nothing is called.
     Calls come from whichever thread compiles.
     """
-    from numba.core import event
 
     class Listener(event.Listener):
         compiled = 0

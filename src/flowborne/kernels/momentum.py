@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from flowborne.kernels.arrays import Array, Integers, Mask
+from flowborne.kernels.jit import kernel
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def about_origin(vector: Array, moment: Array, centre: Array) -> Array:
     """(n, 6) vectors f, and their moments m + c x f about the world origin.
 
@@ -34,7 +34,7 @@ Momenta = tuple[Array, Array, Integers]
 their rows for each dof."""
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def momentum_impulse(
     twist: Array,
     momenta: Momenta,

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from flowborne.kernels.arrays import Array, Integers, Nodes
 from flowborne.kernels.edge_crossings import Placed, distance_to
+from flowborne.kernels.jit import kernel
 
 BAND = 4.0
 """Distances are known up to this many cells from a body; beyond, they are this large."""
@@ -16,7 +16,7 @@ NEAR = 1.75
 cells: the diagonal of a cell."""
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def node_box(
     geoms: Integers, position: Array, rotation: Array, reach: Array, nodes: Nodes, shape: Integers
 ) -> Integers:
@@ -37,7 +37,7 @@ def node_box(
     return box
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def lower_to_body(phi: Array, box: Integers, body: Placed, nodes: Nodes) -> None:
     """Lower the distance at the nodes of a box to that of a geometry."""
     origin, h, flat = nodes
@@ -45,14 +45,15 @@ def lower_to_body(phi: Array, box: Integers, body: Placed, nodes: Nodes) -> None
         x = origin[0] + h * (box[0, 0] + i)
         for j in range(phi.shape[1]):
             y = origin[1] + h * (box[1, 0] + j)
-            for k in range(1 if flat else phi.shape[2]):
+            for k in range(phi.shape[2]):
+                if flat and k > 0:
+                    phi[i, j, k] = phi[i, j, 0]
+                    continue
                 z = 0.0 if flat else origin[2] + h * (box[2, 0] + k)
                 phi[i, j, k] = min(phi[i, j, k], distance_to(body, x, y, z))
-    if flat:
-        phi[:, :, 1:] = phi[:, :, :1]
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def merge(distance: Array, nearest: Integers, phi: Array, box: Integers, body: int) -> None:
     """Lower the union's distance to that of one body inside its box."""
     for i in range(box[0, 0], box[0, 1]):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
+from numba import prange
 
 from flowborne.kernels.arrays import Array, Complex
 from flowborne.kernels.jit import kernel
@@ -28,7 +28,7 @@ def wake_potential(
         out[n] = total / (4.0 * np.pi)
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def sum_layers(out: Complex, layers: Complex, weights: Array, at: int) -> None:
     """Sum of the layers (n, m), each times the weights (k, m) of its distance from the layer `at`.
 

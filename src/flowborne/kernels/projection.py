@@ -6,7 +6,7 @@ A slab is a room one layer thick along its first axis, as in `flux`.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
+from numba import prange
 
 from flowborne.kernels.arrays import Array, Faces, Integers, Marks
 from flowborne.kernels.control_volumes import neighbour
@@ -151,7 +151,7 @@ def subtract_gradient(
                     push(fields, i, j, k, scale, -pressure[i0, j0, k])
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def fill_fresh(pressure: Array, opened: Faces, fresh: Integers, wraps: Integers) -> None:
     """Give cells without a pressure the mean of those beside them, weighted by the open parts of
     the faces between them, in place; from there on to the cells behind them.

@@ -9,11 +9,10 @@ the count is 2, and that is inside as well.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from flowborne.kernels.arrays import Array, Integers, Nodes, Point
 from flowborne.kernels.edge_crossings import Crossings, add_crossing
-from flowborne.kernels.jit import inlined
+from flowborne.kernels.jit import inlined, kernel
 from flowborne.kernels.node_distance import BAND
 from flowborne.kernels.triangles import closest_on_triangle, squared_distance
 
@@ -41,7 +40,7 @@ def box_square(p: Point, a: Point, b: Point, c: Point) -> float:
     return total
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def first_node(x: float, count: int) -> int:
     """First of `count` nodes 0, 1, ... at or beyond x; `count` where there is none."""
     if not x > 0.0:
@@ -49,7 +48,7 @@ def first_node(x: float, count: int) -> int:
     return int(np.ceil(x)) if x < count else count
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def skin_box(vertices: Array, nodes: Nodes, shape: Integers) -> Integers:
     """Node ranges (low, high per axis) around all vertices (n, 3), with the band; may be empty."""
     box, (origin, h, _) = np.empty((3, 2), np.int64), nodes
@@ -61,7 +60,7 @@ def skin_box(vertices: Array, nodes: Nodes, shape: Integers) -> Integers:
     return box
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def edge_at(p: Point, q: Point, z: float) -> tuple[float, float]:
     """(x, y) where the edge between p and q passes z; the same numbers from both of its ends."""
     low, high = (p, q) if p[2] <= z else (q, p)
@@ -69,7 +68,7 @@ def edge_at(p: Point, q: Point, z: float) -> tuple[float, float]:
     return low[0] + t * (high[0] - low[0]), low[1] + t * (high[1] - low[1])
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def add_crossings(
     entered: Integers, counts: tuple[int, int, int], a: Point, b: Point, c: Point
 ) -> None:
@@ -100,7 +99,7 @@ def add_crossings(
                 entered[i, j, k] += enters
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def lower_squares(
     square: Array, counts: tuple[int, int, int], a: Point, b: Point, c: Point, band: float
 ) -> None:
@@ -131,7 +130,7 @@ def lower_squares(
                 square[i, j, k] = min(square[i, j, k], found)
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def sample_skin(
     vertices: Array, triangles: Integers, box: Integers, nodes: Nodes, band: float
 ) -> Array:
@@ -178,7 +177,7 @@ def sample_skin(
     return phi
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def cross_skin(
     found: Crossings, used: Integers, phi: Array, vertices: Array, triangles: Integers,
     piece: Integers, box: Integers, nodes: Nodes,
@@ -237,7 +236,7 @@ def cross_skin(
                     add_crossing(found, used, edge, twice, at_upper, part, unit, piece[t])
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def triangles_by_cell(
     x: Array, vertices: Array, triangles: Integers, h: float
 ) -> tuple[Integers, Integers, Integers]:
@@ -285,7 +284,7 @@ def triangles_by_cell(
     return number, start, found
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def skin_weights(
     x: Array, vertices: Array, triangles: Integers, h: float
 ) -> tuple[Integers, Array]:

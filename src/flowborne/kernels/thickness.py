@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from flowborne.kernels.arrays import Array, Integers, Mask, Point
+from flowborne.kernels.jit import kernel
 from flowborne.kernels.skin import ON_SKIN
 from flowborne.kernels.triangles import along, closest_on_triangle, crossed, squared_distance
 
@@ -18,7 +18,7 @@ MOST_LISTED = 64
 """Cells in which a triangle is listed on average, at most; slivers get larger cells."""
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def apart(vertices: Array, a: int, b: int) -> Point:
     """From vertex a to vertex b."""
     p, q = vertices[a], vertices[b]
@@ -94,7 +94,7 @@ def any_within(
     return found
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _any_within(
     places: Array, radius: float, vertices: Array, triangles: Integers, cells: Cells
 ) -> Mask:
@@ -129,7 +129,7 @@ def _any_within(
     return found
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _way_inward(vertices: Array, triangles: Integers, cells: Cells) -> Array:
     """From cell to cell along each ray (Amanatides and Woo 1987).
 

@@ -6,12 +6,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from flowborne.kernels.arrays import Array, Integers, Point
+from flowborne.kernels.jit import kernel
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def closest_on_triangle(p: Point, a: Point, b: Point, c: Point) -> Point:
     """Weights of a, b, c at the point of their triangle closest to p (Ericson 2005, 5.1.5)."""
     abx, aby, abz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
@@ -45,19 +45,19 @@ def closest_on_triangle(p: Point, a: Point, b: Point, c: Point) -> Point:
     return va / total, vb / total, vc / total
 
 
-@njit(nogil=True, cache=True)
-def crossed(a: Point, b: Point) -> Point:
+@kernel
+def crossed(a: Point | Array, b: Point | Array) -> Point:
     """a x b."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-@njit(nogil=True, cache=True)
-def along(a: Point, b: Point) -> float:
+@kernel
+def along(a: Point | Array, b: Point | Array) -> float:
     """a . b."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def squared_distance(p: Point, a: Point, b: Point, c: Point, weights: Point) -> float:
     """Square of the distance from p to the point of the triangle with the given weights."""
     total = 0.0
@@ -67,7 +67,7 @@ def squared_distance(p: Point, a: Point, b: Point, c: Point, weights: Point) -> 
     return total
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def distances_to_mesh(points: Array, vertices: Array, faces: Integers) -> Array:
     """(n,) signed distances of points (n, 3) to a closed mesh, negative inside, m.
 
@@ -110,7 +110,7 @@ def crossings(
     return _crossings(vertices, triangles, origins, direction, order, first, last)
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _crossings(
     vertices: Array,
     triangles: Integers,
@@ -144,13 +144,13 @@ def _crossings(
     return np.array(lines[1:]), np.array(places[1:]), np.array(signs[1:])
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def beyond(p: Point, q: Array, m: Array) -> float:
     """How far p is from q along m, m."""
     return m[0] * (p[0] - q[0]) + m[1] * (p[1] - q[1]) + m[2] * (p[2] - q[2])
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def squared(p: Point, q: Point) -> float:
     """Square of the distance of two points, m^2."""
     return (p[0] - q[0]) ** 2 + (p[1] - q[1]) ** 2 + (p[2] - q[2]) ** 2
@@ -179,7 +179,7 @@ class Sheets(NamedTuple):
     half: float
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def lower_to_sheets(
     values: Array, corner: Array, pitch: float, sheets: Sheets, band: float
 ) -> None:

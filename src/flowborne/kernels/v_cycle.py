@@ -216,7 +216,7 @@ def leg(hierarchy: Hierarchy, x: Real, b: Real, r: Real, level: int, down: bool)
         restrict(at_level(b, table, level + 1), rl, *between)
 
 
-serial_leg = leg.serial
+serial_leg = leg.inner
 """For levels too small for threads, in the cycle's parallel twin as well."""
 
 

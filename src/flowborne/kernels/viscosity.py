@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit, prange
+from numba import prange
 
 from flowborne.kernels.arrays import PERIODIC, Array, Integers, Marks
 from flowborne.kernels.control_volumes import indices
@@ -98,7 +98,7 @@ def face_along(face: Index, d: int, step: int, count: int, ring: bool) -> Index:
     return at if d == 0 else face[0], at if d == 1 else face[1], at if d == 2 else face[2]
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def nearest_node(distance: Array, i: int, j: int, k: int, ni: int, nj: int, nk: int) -> int:
     """Flat index of the node nearest to a body among those up to (ni, nj, nk) above (i, j, k)."""
     best, least = 0, np.inf
@@ -234,7 +234,7 @@ def meet_walls(
             own, other = opened[f], opened[g] if active else 0.0
             if abs(own - other) < SAME:
                 continue
-            node[n, entry] = nearest_node(distance, *c, 1, 1, 1)
+            node[n, entry] = nearest_node(distance, c[0], c[1], c[2], 1, 1, 1)
             weight = own * (own - other) / max(parts[c], LEAST * max(own, other))
             wall[n, entry] = stiffness * weight
             place[n, entry, axis] = 0.5 * side

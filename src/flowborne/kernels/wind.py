@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from flowborne.kernels.arrays import Array, Integers
+from flowborne.kernels.jit import kernel
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def places(body: Integers, centre: Array, position: Array, rotation: Array) -> Array:
     """(n, 3) patches' centres in the world: position + rotation centre."""
     x = np.empty_like(centre)
@@ -20,7 +20,7 @@ def places(body: Integers, centre: Array, position: Array, rotation: Array) -> A
     return x
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def pushed(
     body: Integers,
     screw: Array,
