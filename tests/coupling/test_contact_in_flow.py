@@ -10,6 +10,7 @@ import pytest
 from flowborne import Grid, Outcome, World, step
 from flowborne.bodies import JointCommand
 from flowborne.coupling import solve
+from flowborne.coupling.viscous_solve import Viscosity
 from flowborne.worlds import PressureSolution, PressureSystem, advance, make_world
 
 BOX = """<mujoco><worldbody>
@@ -75,8 +76,8 @@ def missed(solution: PressureSolution) -> PressureSolution:
 
 def test_each_solve_that_misses_its_tolerance_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     world = sliding(GRIDS["slab"], 1)
-    diffuse, solved = solve.diffuse, PressureSystem.solve
-    monkeypatch.setattr(solve, "diffuse", lambda *given: (*diffuse(*given)[:2], False))
+    smooth, solved = Viscosity.solve, PressureSystem.solve
+    monkeypatch.setattr(Viscosity, "solve", lambda *given: (*smooth(*given)[:2], False))
     assert step(world.copy(), 0.01).outcome is Outcome.VISCOSITY_NOT_CONVERGED
     monkeypatch.setattr(
         PressureSystem, "solve", lambda *given, **named: missed(solved(*given, **named))

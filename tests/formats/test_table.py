@@ -54,6 +54,6 @@ def test_every_column_that_names_a_unit_has_it(chain: Path, fish: Path, walk: Pa
         if unit_of(column) == "1"
     }
     assert bare <= {
-        *("frame", "detF", "out", "error", "iterations", "residual", "contacts"),
+        *("frame", "detF", "out", "error", "iterations", "sweeps", "residual", "contacts"),
         *("qw", "qx", "qy", "qz"),
     }

@@ -55,9 +55,9 @@ MODEL = """
 """
 
 
-def history(path, places, errors=None):
-    """One body along x, and the budget's error in each frame."""
-    columns = ("frame", "ball_x_m", "ball_y_m", "momentum_budget_error")
+def history(path, places, errors=None, column="momentum_budget_error"):
+    """One body along x, and an error in each frame, by default the budget's."""
+    columns = ("frame", "ball_x_m", "ball_y_m", column)
     rows = History.create(path, columns)
     for frame, x in enumerate(places, 1):
         error = errors[frame - 1] if errors else 1e-13
@@ -90,6 +90,13 @@ def test_an_open_momentum_budget_is_told_with_its_worst_frame(tmp_path):
     path = history(tmp_path / "history.csv", (0.5, 0.5, 0.5), (1e-13, 3e-4, 2e-5))
     (said,) = doubts_of(path, ["ball"], FLUID)
     assert "momentum_budget_error is 0.0003 in frame 2" in said
+
+
+def test_viscosity_and_pressure_apart_are_told(tmp_path):
+    for errors, told in ((9e-5, 5e-5), 0), ((5e-5, 2e-2), 1):
+        path = history(tmp_path / f"{told}.csv", (0.5, 0.5), errors, "sweep_error")
+        assert len(doubts_of(path, ["ball"], FLUID)) == told
+    assert "sweep_error is 0.02 in frame 2" in doubts_of(path, ["ball"], FLUID)[0]
 
 
 def test_a_run_that_leaves_its_domain_is_not_done_when_resumed_either(

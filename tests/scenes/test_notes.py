@@ -32,3 +32,10 @@ def test_sides_that_whole_cells_make_longer_are_told() -> None:
         notes = " ".join(notes_of(scene, build(scene).world.setup.solid))
         assert ("longer" in notes) == bool(told)
         assert told in notes
+
+
+def test_a_flow_that_creeps_is_told() -> None:
+    for viscosity, told in (("1e-3", False), ("1e6", True)):
+        scene = load_scene("ns-block-drag-max", {"fluid.viscosity": viscosity})
+        notes = " ".join(notes_of(scene, build(scene).world.setup.solid))
+        assert ("[fluid]: creeping: nu dt / h^2 is" in notes) == told

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from flowborne.coupling.creeping import creeps
 from flowborne.coupling.cut import Departure, gradient_on, moved_since
 from flowborne.coupling.operators import pressure_push, side_push
 from flowborne.coupling.world import Fluid, World
@@ -47,8 +48,9 @@ class HalfPressure:
 def explicit_half_pressure(world: World, start: Departure, dt: float) -> HalfPressure:
     """Half of the last pressure, on the grid and the control volumes of the start.
 
-    It is 0 if the bodies have been moved since, and in a domain with an open side: fluid that comes
-    in there brings energy, which the step without it damps.
+    It is 0 if the bodies have been moved since, where the flow creeps and has no energy to keep,
+    and in a domain with an open side: fluid that comes in there brings energy, which the step
+    without it damps.
     Behind a far side there is a sea, and what comes in has no more energy than that has; the
     pressure that changes the sea's velocity is not half of it given beforehand.
 
@@ -60,7 +62,8 @@ def explicit_half_pressure(world: World, start: Departure, dt: float) -> HalfPre
     if world.setup.balances:
         momentum = fluid.density * fluid_momentum(state.velocity, volumes, grid, sides)
     size = 6 * world.setup.solid.nbody + start.cut.skins.vertices.size
-    if sides.gain_energy(grid) or sea_changes(world, dt) or moved_since(world):
+    acts = not (sides.gain_energy(grid) or sea_changes(world, dt) or creeps(fluid, dt))
+    if not acts or moved_since(world):
         still = np.zeros(grid.shape), np.zeros(size), np.zeros(3)
         return HalfPressure(state.velocity, *still, momentum)
     gradient = gradient_on(world, start.cut, start.volumes)

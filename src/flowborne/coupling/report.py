@@ -153,6 +153,9 @@ class StepReport:
     solver_iterations
                      of the pressure solves
     residual         true relative residual of the last of them
+    sweeps           of viscosity and pressure: more than 1 where the flow creeps (see
+                     `coupling.creeping`)
+    sweep_error      by how much they were apart after the last one, relative to the pressure
     contacts         number of active contacts
     fastest          largest speed of the fluid across an open face after the solve, m/s
     seconds          where the time went: advection, viscosity, projection, geometry, solids
@@ -189,6 +192,8 @@ class StepReport:
     dye_budget_error: Worst = 0.0
     solver_iterations: Annotated[int, Joined(sum, max)] = 0
     residual: Annotated[float, Joined(last, max)] = 0.0
+    sweeps: Annotated[int, Joined(max, max)] = 0
+    sweep_error: Worst = 0.0
     contacts: Annotated[int, Joined(last, max)] = 0
     fastest: Annotated[float, Joined(max, max, "m/s")] = 0.0
     seconds: Annotated[dict[str, float], Joined(last)] = field(default_factory=dict)

@@ -10,8 +10,8 @@ A^-1 has the prescribed dofs projected out; active contact rows and joint limits
 the solution opens a contact that was taken as pressed, or the other way round, asks a drive for
 more than its torque limit, or moves the bodies otherwise than their Coriolis forces were made for,
 the system is solved again with that changed: the first time only roughly where that is to be
-expected, to the full tolerance in the end. Viscosity is solved again for new contacts only: what
-the others change is small in dt.
+expected, to the full tolerance in the end. Viscosity is solved again for new contacts only, as what
+the others change is small in dt, and where it is strong (`creeping`).
 
 Method: docs/method/coupled-solve.md.
 """
@@ -25,6 +25,7 @@ from math import prod, sqrt
 
 import numpy as np
 
+from flowborne.coupling.creeping import SWEEPS, Sweeps, creeps
 from flowborne.coupling.cut import gradient_on, source_rate
 from flowborne.coupling.fractions import Geometry
 from flowborne.coupling.mouths import Jet, add_rates
@@ -38,8 +39,8 @@ from flowborne.coupling.operators import (
     side_push,
 )
 from flowborne.coupling.report import Outcome, timed
-from flowborne.coupling.viscous_solve import diffuse
-from flowborne.coupling.world import World
+from flowborne.coupling.viscous_solve import viscosity_on
+from flowborne.coupling.world import Fluid, World
 from flowborne.fluid.control_volumes import ControlVolumes
 from flowborne.fluid.ghosts import plane, planes
 from flowborne.fluid.grid import Grid
@@ -47,7 +48,7 @@ from flowborne.fluid.projection import PressureGradient, face_weights
 from flowborne.kernels.arrays import ROUNDING, Array, Faces, Integers
 from flowborne.kernels.coupling_rows import fastest_closed
 from flowborne.kernels.faces import largest_open, largest_size
-from flowborne.kernels.projection import open_outflow
+from flowborne.kernels.projection import fill_fresh, open_outflow
 from flowborne.solids.driven import Driven, within_limits
 from flowborne.solids.dynamics import Kinematics
 from flowborne.solvers.mobility import Mobility
@@ -101,6 +102,8 @@ class SolvedFlow(Solved):
     impulse          (k,) J^T p^
     sides            (3,) impulse of the sides on the fluid, N s; nan without balances
     iterations       of the pressure solve, all turns of a step together
+    sweeps           of viscosity and pressure, see `creeping`
+    sweep_error      what they are apart by at the end, relative to the pressure
     residual         true relative residual
     divergence       largest |net outflow of a cell| / volume, 1/s; nan without balances
     fastest          largest |u+| on an open face, m/s; likewise
@@ -114,6 +117,8 @@ class SolvedFlow(Solved):
     impulse: Array
     sides: Array
     iterations: int
+    sweeps: int
+    sweep_error: float
     residual: float
     divergence: float
     fastest: float
@@ -185,14 +190,18 @@ def solve_together(
         tolerance = max(tolerance, ROUGH)
     rate = source_rate(fluid, world.time + dt, cut.open)
     add_rates(rate, jets)
-    given = world, velocity, volumes, gradient, cut, jets, pose
-    smooth, viscous, smoothed = diffuse(*given, driven)
-    term = LowRankTerm(cut.rows, mobility)
+    viscosity = viscosity_on(world, velocity, volumes, gradient, cut, jets, pose, driven)
+    term, given = LowRankTerm(cut.rows, mobility), filled_pressure(state.pressure, cut, fluid)
+    smooth, viscous, smoothed = viscosity.solve(driven, given)
     grid, net = fluid.grid, np.empty(fluid.grid.shape)
     net_outflow(net, smooth, cut, rate, grid)
     floor = rounding_floor(smooth, cut, boundary_velocity(pose, driven.velocity), fluid.grid)
     iterations, tried = 0, driven
-    for _ in range(PASSES):
+    sweeps = None
+    if viscosity.system is not None and creeps(fluid, dt):
+        yields = viscosity.system.yields(cut.open)
+        sweeps = Sweeps(cut.volume, yields, matrix.closed_regions(), dt)
+    for _ in range(PASSES * (SWEEPS if sweeps else 1)):
         start = boundary_velocity(pose, driven.after(generalised(pose, viscous)))
         rhs = -net
         add_flux(rhs, cut, -start)
@@ -203,17 +212,31 @@ def solve_together(
         v = driven.after(impulse)
         actuator = driven.actuator(v, impulse)
         changed = correct(driven, v, actuator, torque_limit)
-        if changed is None and tolerance <= fluid.tolerance:
-            break
+        pressure, again = solution.pressure, False
         if changed is not None:
-            if not changed.same_mobility(driven):
+            again = not changed.same_mobility(driven)
+            if again:
                 term = replace(term, mobility=changed.mobility(pose))
-                smooth, viscous, smoothed = diffuse(*given, changed)
-                net_outflow(net, smooth, cut, rate, grid)
+                if sweeps:
+                    sweeps.forget()
             tried, driven = driven, changed
+        elif tolerance <= fluid.tolerance:
+            if sweeps is None:
+                break
+            push = generalised(pose, viscous + pressure_push(cut, dt * given, start.size))
+            field, outflow = grid.empty_faces(), np.empty(grid.shape)
+            gradient.subtract(smooth, given, dt, field)
+            net_outflow(outflow, field, cut, rate, grid)
+            add_flux(outflow, cut, boundary_velocity(pose, driven.after(push)))
+            better = sweeps.next(dt * given, solution.pressure, outflow)
+            if better is None:
+                break
+            again, pressure, given = True, better, better / dt
+        if again:
+            smooth, viscous, smoothed = viscosity.solve(driven, given)
+            net_outflow(net, smooth, cut, rate, grid)
         tolerance = fluid.tolerance
-        pressure = solution.pressure
-    after = fluid.grid.empty_faces()
+    after = grid.empty_faces()
     gradient.subtract(smooth, solution.pressure, 1.0, after)
     left = unsettled(tried, changed, v)
     outcome = Outcome.DONE if changed is None else Outcome.NOT_SETTLED
@@ -252,6 +275,8 @@ def solve_together(
         impulse=on_solids,
         sides=pushed,
         iterations=iterations,
+        sweeps=sweeps.count if sweeps else 1,
+        sweep_error=sweeps.error if sweeps else 0.0,
         residual=solution.residual,
         divergence=divergence,
         fastest=fastest,
@@ -330,6 +355,16 @@ def give_way(cut: Geometry, mobility: Mobility, grid: Grid) -> Array:
         room.flat[cells] += field.flat[cells] * moved.flat[cells] / PROBES
     room.flat[cells] = np.maximum(room.flat[cells], 0.0)
     return room
+
+
+def filled_pressure(pressure: Array, cut: Geometry, fluid: Fluid) -> Array:
+    """(nx, ny, nz) the pressure for a viscous fluid; in cells that have opened since, what is
+    around them."""
+    if fluid.viscosity == 0.0:
+        return pressure
+    filled, wraps = pressure.copy(), np.array(fluid.grid.shape) * fluid.boundaries.periodic()
+    fill_fresh(filled, cut.open, np.flatnonzero(filled == 0.0), wraps)
+    return filled
 
 
 def net_outflow(net: Array, velocity: Faces, cut: Geometry, rate: Array, grid: Grid) -> None:

@@ -122,6 +122,8 @@ def report_coupled(
         "added_mass": Asked(added_mass, kept=not callable(added)),
         "solver_iterations": solved.iterations,
         "residual": solved.residual,
+        "sweeps": solved.sweeps,
+        "sweep_error": solved.sweep_error,
         "divergence": solved.divergence,
         "fastest": solved.fastest,
     }

@@ -20,10 +20,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
+from functools import partial
 
 import numpy as np
 from scipy.sparse import block_diag, csr_array
 
+from flowborne.coupling.creeping import creeps
 from flowborne.coupling.flesh import skin_at
 from flowborne.coupling.fractions import Geometry
 from flowborne.coupling.mouths import Jet, skin_slip
@@ -38,13 +40,13 @@ from flowborne.fluid.projection import PressureGradient
 from flowborne.fluid.viscosity import OpenParts, ViscousFaces, assemble_viscosity
 from flowborne.kernels.arrays import Array, Faces, Integers
 from flowborne.kernels.corner_friction import AROUND
-from flowborne.kernels.projection import fill_fresh
 from flowborne.kernels.sparse_rows import add_rows, sum_rows
 from flowborne.kernels.viscosity import apply_component
 from flowborne.solids.driven import Driven
 from flowborne.solids.dynamics import Kinematics
 from flowborne.solvers.conjugate_gradients import conjugate_gradients, spread
 from flowborne.solvers.mobility import Answering, Drag
+from flowborne.solvers.v_cycle import VCycle
 
 TOLERANCE = 1e-12
 """Relative residual of the viscous solve."""
@@ -167,6 +169,26 @@ def weights(system: ViscousFaces) -> csr_array:
     return csr_array((values, places, starts), (first + around, first + around))
 
 
+def cycle_on(system: ViscousFaces, wraps: Integers) -> VCycle:
+    """A V-cycle on the links of a component and what its diagonal has besides."""
+    shape = system.kind.shape
+    sizes = [int(w) or n for w, n in zip(wraps, shape, strict=True)]
+    own = tuple(slice(0, n) for n in sizes)
+    weights = []
+    for d in range(3):
+        weight = np.zeros([n + (a == d) for a, n in enumerate(sizes)])
+        upper = [slice(0, n) for n in sizes]
+        upper[d] = slice(1, None)
+        weight[tuple(upper)] = system.links[d][own]
+        if wraps[d]:
+            weight[edge(d, 0)] = weight[edge(d, -1)]
+        weights.append(weight)
+    rest = system.diagonal[own].copy()
+    for d in range(3):
+        rest -= weights[d][edge(d, slice(1, None))] + weights[d][edge(d, slice(None, -1))]
+    return VCycle(faces_of(weights), np.maximum(rest, 0.0), system.diagonal[own], wraps > 0)
+
+
 def between_faces(systems: list[ViscousFaces], scale: Array) -> tuple[Integers, csr_array]:
     """The faces that corners couple, and what W has between them, scaled on both sides.
 
@@ -210,13 +232,29 @@ class ViscousSystem:
         self.scale = np.where(unknown, 1.0 / np.sqrt(np.where(unknown, self.diagonal, 1.0)), 0.0)
         self.most = MOST * max(MOST, *grid.shape)
         self.couples = walls.couples(bodies)
-        self.answer = answering(dt * walls.drag(self.couples, size))
+        self.answer_by(answering)
         count, entries = walls.arm.shape
         scale = self.scale[walls.index]
         pull = scale[:, None] * (walls.weight @ walls.arm)
         starts = np.arange(0, count * entries + 1, entries)
         self.rows = walls.index, starts, walls.columns.ravel(), pull.ravel()
         self.corner_faces, self.corners = between_faces(systems, self.scale)
+        self.cycles: list[VCycle] = []  # of each component, where the flow creeps
+        self.last: Array | None = None  # solution, for the next one there
+
+    def answer_by(self, answering: Callable[[Drag], Answering]) -> None:
+        """Let the bodies answer the drag so from now on."""
+        self.answer = answering(self.dt * self.walls.drag(self.couples, self.size))
+
+    def yields(self, opened: Faces) -> Array:
+        """(nx, ny, nz) what friction lets out of each cell per time and unit pressure, the sum of
+        (a A)^2 / D over its faces for the friction D on each: V / mu in the bulk."""
+        out = np.zeros(self.grid.shape)
+        for axis, system in zip(self.grid.axes, self.systems, strict=True):
+            friction, area = system.diagonal - system.mass, opened[axis] * self.grid.face_area
+            flow = np.divide(area**2, friction, out=np.zeros(area.shape), where=friction > 0.0)
+            out += flow[edge(axis, slice(None, -1))] + flow[edge(axis, slice(1, None))]
+        return out
 
     def at_walls(self, twist: Array) -> Array:
         """(n,) B s: velocity of the bodies at the wall faces, m/s."""
@@ -235,6 +273,16 @@ class ViscousSystem:
         if self.answer.yields:
             push = sum_rows(x, self.rows, self.size)
             add_rows(out, self.rows, -self.answer.change(self.dt * push))
+        return out
+
+    def precondition(self, residual: Array) -> Array:
+        """V-cycles on the links of the components, of the scaled system, times a residual."""
+        out = residual.copy()
+        given, found = residual.reshape(-1), out.reshape(-1)
+        for system, cycle in zip(self.systems, self.cycles, strict=True):
+            part = system.part
+            root = np.sqrt(self.diagonal[part]).reshape(system.kind.shape)
+            found[part] = (root * cycle.times(root * given[part].reshape(root.shape))).ravel()
         return out
 
     def solve(
@@ -258,10 +306,13 @@ class ViscousSystem:
         rhs = np.where(unknown, mass * start + given, 0.0)
         known = self.answer.to(self.push(np.where(unknown, 0.0, start), twist, blown))[0]
         np.add.at(rhs, walls.index, walls.weight @ (self.at_walls(twist + known) + blown))
-        guess, right = np.where(unknown, start, 0.0), spread(self.scale * rhs)
-        y = spread(guess * np.sqrt(self.diagonal))
-        converged = conjugate_gradients(self.apply, right, y, tolerance, self.most)
+        right = spread(self.scale * rhs)
+        guess = start if self.last is None else self.last
+        y = spread(np.where(unknown, guess, 0.0) * np.sqrt(self.diagonal))
+        guide = self.precondition if self.cycles else None
+        converged = conjugate_gradients(self.apply, right, y, tolerance, self.most, guide)
         result = np.where(unknown, self.scale * y.reshape(-1)[: start.size], start)
+        self.last = result if self.cycles else None
         impulse = self.answer.to(self.push(result, twist, blown))[1]
         return self._split(result, velocity), impulse, converged
 
@@ -288,8 +339,54 @@ class ViscousSystem:
         return faces_of(parts)
 
 
+@dataclass
+class Viscosity:
+    """Implicit viscosity at the end of a step, for any pressure and any answer of the bodies.
+
+    velocity  Faces u*, m/s
+    gradient  of the pressure
+    system    as the bodies answer it; None where the fluid has no viscosity
+    slip      (n,) see `ViscousSystem.solve`
+    driven    the bodies that answer
+    """
+
+    velocity: Faces
+    gradient: PressureGradient
+    cut: Geometry
+    pose: Kinematics
+    system: ViscousSystem | None
+    slip: Array
+    driven: Driven
+
+    @timed("viscosity")
+    def solve(self, driven: Driven, pressure: Array) -> tuple[Faces, Array, bool]:
+        """The velocity after viscosity, and its impulse on the bodies.
+
+        The pressure is there so that the boundary layer is that of the flow at the end of the step;
+        it is taken off again before the new pressure is solved for.
+
+        pressure  (nx, ny, nz) Pa
+        returns   Faces; (k,) impulse; whether the solve converged
+        """
+        pose, cut, gradient = self.pose, self.cut, self.gradient
+        size = 6 * pose.twist_jacobian.shape[0] + pose.vertices.size
+        if self.system is None:
+            return self.velocity, np.zeros(size), True
+        dt = driven.system.dt
+        if not driven.same_mobility(self.driven):
+            self.system.answer_by(partial(driven.answering, pose))
+        self.driven = driven
+        pushed = faces_of([u.copy() for u in self.velocity])
+        gradient.subtract(pushed, pressure, dt)
+        earlier = pressure_push(cut, dt * pressure, size)
+        moving = boundary_velocity(pose, driven.after(generalised(pose, earlier)))
+        smooth, impulse, converged = self.system.solve(pushed, moving, TOLERANCE, self.slip)
+        gradient.subtract(smooth, pressure, -dt)
+        return smooth, impulse, converged
+
+
 @timed("viscosity")
-def diffuse(
+def viscosity_on(
     world: World,
     velocity: Faces,
     volumes: ControlVolumes,
@@ -298,45 +395,29 @@ def diffuse(
     jets: tuple[Jet, ...],
     pose: Kinematics,
     driven: Driven,
-) -> tuple[Faces, Array, bool]:
-    """Implicit viscosity with the pressure of the last step, and its impulse on the bodies.
-
-    The pressure is there so that the boundary layer is that of the flow at the end of the step;
-    it is taken off again before the new pressure is solved for. Cells that have opened since have
-    that around them.
-
-    returns  Faces; (k,) impulse; whether the solve converged
-    """
-    (fluid, state), dt = world.flow(), driven.system.dt
-    bodies = pose.twist_jacobian.shape[0]
-    size = 6 * bodies + pose.vertices.size
-    if fluid.viscosity == 0.0:
-        return velocity, np.zeros(size), True
-    grid, sides = fluid.grid, fluid.boundaries
-    last, wraps = state.pressure.copy(), np.array(grid.shape) * np.array(sides.periodic())
-    fill_fresh(last, cut.open, np.flatnonzero(last == 0.0), wraps)
-    pushed = faces_of([u.copy() for u in velocity])
-    gradient.subtract(pushed, last, dt)
-    earlier = pressure_push(cut, dt * last, size)
-    moving = boundary_velocity(pose, driven.after(generalised(pose, earlier)))
-    parts = assemble_viscosity(
-        OpenParts(cut.distance, cut.crossings, cut.open, cut.volume),
-        velocity,
-        face_masses(volumes, fluid.density),
-        grid,
-        sides,
-        fluid.viscosity,
-        dt,
-        world.time + dt,
-    )
-    walls = on_flesh(walls_of(parts, cut, grid), cut, bodies, grid)
-    system = ViscousSystem(
-        parts, walls, size, bodies, lambda drag: driven.answering(pose, drag), grid, sides, dt
-    )
-    slip = skin_slip(jets, walls.point, walls.across, walls.body, cut, grid)
-    smooth, impulse, converged = system.solve(pushed, moving, TOLERANCE, slip)
-    gradient.subtract(smooth, last, -dt)
-    return smooth, impulse, converged
+) -> Viscosity:
+    """Viscosity on the cut at the end of a step, assembled."""
+    (fluid, _), dt, bodies = world.flow(), driven.system.dt, pose.twist_jacobian.shape[0]
+    grid, sides, system, slip = fluid.grid, fluid.boundaries, None, np.zeros(0)
+    if fluid.viscosity > 0.0:
+        parts = assemble_viscosity(
+            OpenParts(cut.distance, cut.crossings, cut.open, cut.volume),
+            velocity,
+            face_masses(volumes, fluid.density),
+            grid,
+            sides,
+            fluid.viscosity,
+            dt,
+            world.time + dt,
+        )
+        walls = on_flesh(walls_of(parts, cut, grid), cut, bodies, grid)
+        size = 6 * bodies + pose.vertices.size
+        answering = partial(driven.answering, pose)
+        system = ViscousSystem(parts, walls, size, bodies, answering, grid, sides, dt)
+        if creeps(fluid, dt):
+            system.cycles = [cycle_on(part, system.wraps) for part in parts]
+        slip = skin_slip(jets, walls.point, walls.across, walls.body, cut, grid)
+    return Viscosity(velocity, gradient, cut, pose, system, slip, driven)
 
 
 def on_flesh(walls: Walls, cut: Geometry, bodies: int, grid: Grid) -> Walls:

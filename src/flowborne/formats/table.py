@@ -16,7 +16,7 @@ from flowborne.runs.exporters import provided
 from flowborne.runs.history import unit_of
 from flowborne.runs.open_run import OpenRun
 
-COUNTS = ("frame", "solver_iterations", "contacts", "flesh_inside_out")
+COUNTS = ("frame", "solver_iterations", "sweeps", "contacts", "flesh_inside_out")
 """Columns of integers."""
 
 

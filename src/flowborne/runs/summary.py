@@ -31,6 +31,10 @@ BUDGET_OPEN = 1e-6
 """`momentum_budget_error` above which momentum is not conserved; a sound run has about 1e-13."""
 
 
+APART = 1e-4
+"""`sweep_error` above which viscosity and pressure are apart: `coupling.creeping.AGREED`."""
+
+
 def final_frames(frames: int) -> int:
     """Number of frames at the end for a final mean."""
     return min(frames, max(FINAL_FRAMES, round(FINAL_PART * frames)))
@@ -148,7 +152,7 @@ def doubts_of(history: Path, bodies: Sequence[str], fluid: Fluid | None) -> list
     """
     if fluid is None:
         return []
-    found = departure(history, bodies, fluid), open_budget(history)
+    found = departure(history, bodies, fluid), open_budget(history), apart(history)
     return [doubt for doubt in found if doubt]
 
 
@@ -179,15 +183,31 @@ def departure(history: Path, bodies: Sequence[str], fluid: Fluid) -> str | None:
 
 def open_budget(history: Path) -> str | None:
     """The frame with the largest error of the momentum budget, if above BUDGET_OPEN."""
-    column = "momentum_budget_error"
-    if column not in history_columns(history):
-        return None
-    rows = history_rows(history, ["frame", column])
-    frame, error = max(rows, key=lambda row: row[1], default=(0.0, 0.0))
+    frame, error = worst(history, "momentum_budget_error")
     if error <= BUDGET_OPEN:
         return None
     return (
-        f"momentum was lost or made: {column} is {error:.2g} in frame {frame:.0f}, and some 1e-13 "
-        "in a sound run; take more steps per frame, or enlarge [domain] if a body reaches "
-        "through a side of it then"
+        f"momentum was lost or made: momentum_budget_error is {error:.2g} in frame {frame:.0f}, "
+        "and some 1e-13 in a sound run; take more steps per frame, or enlarge [domain] if a body "
+        "reaches through a side of it then"
     )
+
+
+def apart(history: Path) -> str | None:
+    """The frame in which viscosity and pressure agreed least, if they did not."""
+    frame, error = worst(history, "sweep_error")
+    if error <= APART:
+        return None
+    return (
+        f"viscosity and pressure did not agree: sweep_error is {error:.2g} in frame {frame:.0f}, "
+        f"and at most {APART:g} where they do; take more steps per frame"
+    )
+
+
+def worst(history: Path, column: str) -> tuple[float, float]:
+    """Frame and value where a column is largest; 0 in a history without it."""
+    if column not in history_columns(history):
+        return 0.0, 0.0
+    rows = history_rows(history, ["frame", column])
+    frame, value = max(rows, key=lambda row: row[1], default=(0.0, 0.0))
+    return frame, value

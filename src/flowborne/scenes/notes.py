@@ -8,6 +8,7 @@ import numpy as np
 
 from flowborne.base.phrases import listed
 from flowborne.control.rules import RuleFixed
+from flowborne.coupling.creeping import CREEPING, viscous_number
 from flowborne.motion.bvh import MAX_BONE_STRETCH
 from flowborne.motion.clip_reading import (
     MIN_STANDING_COSINE,
@@ -47,6 +48,20 @@ def notes_of(scene: Scene, model: SolidModel) -> Iterator[str]:
     yield from _wide_probes(scene, model)
     yield from _longer_sides(scene)
     yield from window_notes(scene)
+    yield from _creeping(scene)
+
+
+def _creeping(scene: Scene) -> Iterator[str]:
+    """That viscosity and pressure are solved for several times a step."""
+    if scene.fluid is None or scene.domain is None:
+        return
+    dt, h = scene.frame_time / scene.time.steps_per_frame, scene.domain.grid().spacing
+    number = viscous_number(scene.fluid.viscosity, scene.fluid.density, dt, h)
+    if number >= CREEPING:
+        yield (
+            f"[fluid]: creeping: nu dt / h^2 is {number:.3g}, so a step takes about 8 solves of "
+            "viscosity and pressure"
+        )
 
 
 def _longer_sides(scene: Scene) -> Iterator[str]:

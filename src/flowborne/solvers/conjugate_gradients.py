@@ -24,7 +24,12 @@ def spread(values: Array) -> Array:
 
 
 def conjugate_gradients(
-    apply: Callable[[Array], Array], right: Array, x: Array, tolerance: float, most: int
+    apply: Callable[[Array], Array],
+    right: Array,
+    x: Array,
+    tolerance: float,
+    most: int,
+    precondition: Callable[[Array], Array] | None = None,
 ) -> bool:
     """Solve apply(x) = right from the guess in x, in place; returns whether the residual asked for
     was reached.
@@ -33,16 +38,17 @@ def conjugate_gradients(
     right, x   vectors as `spread` gives them
     tolerance  relative residual
     most       iterations
+    precondition  close to the inverse of the matrix, symmetric positive definite
     """
     residual = right - apply(x)
     direction = np.zeros_like(x)
     goal = max(tolerance**2 * dot(right, right), ROUNDING**2 * dot(x, x))
-    square, beta, iterations = dot(residual, residual), 0.0, 0
+    square, before, iterations = dot(residual, residual), np.inf, 0
     while square > goal and iterations < most:
-        turn(direction, residual, beta)
+        guided = residual if precondition is None else precondition(residual)
+        product = square if precondition is None else dot(residual, guided)
+        turn(direction, guided, product / before)
         image = apply(direction)
-        step = square / dot(direction, image)
-        before, square = square, descend(x, residual, direction, image, step)
-        beta = square / before
-        iterations += 1
+        square = descend(x, residual, direction, image, product / dot(direction, image))
+        before, iterations = product, iterations + 1
     return bool(square <= goal)
