@@ -63,8 +63,10 @@ class SolidsTable(Table):
                a free joint of its own name
     displace   which geoms the fluid meets
     hold       joints that stay as they start: true for all between bodies that nothing else drives
-               and no spring holds, or names. A position actuator of the model on such a joint
-               becomes its "pd" servo, with the actuator's stiffness and largest force
+               and no spring holds, or names; "root" is the free joint by which a body floats. A
+               joint in a loop that an equality closes cannot be held. A position actuator of the
+               model on a held joint becomes its "pd" servo, with the actuator's stiffness and
+               largest force
     packages   folders in which `package://name/...` of a URDF is looked for, besides those above
                it: each holds the package's folder, or is it
     mend       "hull": open meshes are replaced by their convex hulls. Holes up to a twentieth of
