@@ -89,14 +89,8 @@ def rows_of(model: SolidModel, s: Scratch) -> tuple[Rows | None, Integers]:
     if count == 0:
         return None, np.zeros(0, np.int64)
     kind = data.efc_type
-    if mujoco.mj_isSparse(s.mj):
-        J = np.zeros((count, model.nv))
-        row = np.repeat(np.arange(count), data.efc_J_rownnz)
-        J[row, data.efc_J_colind[: len(row)]] = data.efc_J[: len(row)]
-    else:
-        J = np.array(data.efc_J).reshape(count, model.nv)
     rows = Rows(
-        J,
+        row_jacobian(s.mj, data),
         np.array(data.efc_D),
         np.array(data.efc_aref),
         np.array(data.efc_frictionloss),
@@ -105,6 +99,16 @@ def rows_of(model: SolidModel, s: Scratch) -> tuple[Rows | None, Integers]:
     )
     zones = data.efc_state.astype(np.int64)
     return merge_frictionless(*stop_in_time(rows, zones, model, s), s)
+
+
+def row_jacobian(mj: mujoco.MjModel, data: mujoco.MjData) -> Array:
+    """(k, nv) Jacobian of MuJoCo's constraint rows."""
+    if not mujoco.mj_isSparse(mj):
+        return np.array(data.efc_J).reshape(data.nefc, mj.nv)
+    J = np.zeros((data.nefc, mj.nv))
+    row = np.repeat(np.arange(data.nefc), data.efc_J_rownnz)
+    J[row, data.efc_J_colind[: len(row)]] = data.efc_J[: len(row)]
+    return J
 
 
 def stop_in_time(
