@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -172,6 +173,25 @@ def test_a_wing_turns_between_its_stops(written: Written) -> None:
             angles.append(np.degrees(simulation.world.solid.q[1]))
     assert -45.5 < min(angles) < -44.5
     assert 44.5 < max(angles) < 45.5
+
+
+@pytest.mark.parametrize("solref", ["0.021 1", "0.0105 2", "-2000 -80"])
+def test_a_soft_stop_of_the_model_is_compared_with_the_fastest_drive(
+    written: Written, solref: str
+) -> None:
+    """It is kept, and a stop that the warning proposes ends the warning."""
+    limit = 'range="-45 45"'
+    model = WING.replace(limit, f'{limit} solreflimit="{solref}"')
+    path = written(BEAT.replace("ramp(t, 0.01) * ", ""), model)
+    scene = load_scene(path)
+    (said,) = [w for w in warnings_of(scene, build(scene).world.setup) if "stop" in w]
+    found = re.search(r"stroke moves with a period of ([\d.]+) ms; solreflimit = \"(.*)\" in", said)
+    assert found is not None
+    assert float(found[1]) == pytest.approx(1e3 / 34.0, rel=0.03)
+    for better in (WING.replace(limit, f'{limit} solreflimit="{found[2]}"'), WING):
+        path.with_name("model.xml").write_text(better)
+        scene = load_scene(path)
+        assert not [w for w in warnings_of(scene, build(scene).world.setup) if "stop" in w]
 
 
 def test_joints_of_a_loop_are_not_undriven_and_cannot_be_held(written: Written) -> None:

@@ -13,7 +13,7 @@ from flowborne.solids.constraints import row_jacobian
 from flowborne.solids.geoms import element_name
 from flowborne.solids.loops import active_equalities
 from flowborne.solids.model import BALL, SLIDE, SolidModel, turning_dofs
-from flowborne.solids.scratch import STOP_STEPS, posed
+from flowborne.solids.scratch import STOP_STEPS, posed, time_constant
 
 DEGREE = float(np.radians(1.0))
 """rad that a joint may be beyond its range."""
@@ -97,10 +97,8 @@ class Equalities:
         of_equality = data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY
         gravity = float(np.linalg.norm(self.model.gravity))
         for number, name in active_equalities(mj):
-            T, soft = (
-                self._time_constant(mj.eq_solref[number]),
-                1.0 - float(mj.eq_solimp[number, 0]),
-            )
+            T = max(time_constant(mj.eq_solref[number]), STOP_STEPS * self.dt)
+            soft = 1.0 - float(mj.eq_solimp[number, 0])
             rows = np.flatnonzero(of_equality & (data.efc_id == number))
             for some, scale, turns in _parts(self.model, number, rows.tolist()):
                 speed = float(np.linalg.norm(J[some] @ np.abs(v))) / scale
@@ -111,12 +109,6 @@ class Equalities:
                 allowed = soft * (V * T + (0.0 if turns else gravity * T**2)) + SHARE * lever
                 amount = float(np.linalg.norm(data.efc_pos[some])) / scale
                 yield Passed(f"equality '{name}'", amount, allowed, turns)
-
-    def _time_constant(self, solref: Array) -> float:
-        """s; of a stiffness k it is 1 / sqrt(k)."""
-        first, ratio = float(solref[0]), float(solref[1])
-        own = first * ratio if first > 0.0 else 1.0 / np.sqrt(max(-first, 1e-12))
-        return max(own, STOP_STEPS * self.dt)
 
 
 def _parts(

@@ -131,6 +131,12 @@ class Scratch:
         return self._mass
 
 
+def time_constant(solref: Array) -> float:
+    """s of a constraint; that of a stiffness k is 1 / sqrt(k)."""
+    first, ratio = float(solref[0]), float(solref[1])
+    return first * ratio if first > 0.0 else 1.0 / max(-first, 1e-12) ** 0.5
+
+
 _local = threading.local()
 
 
