@@ -194,6 +194,17 @@ def test_a_soft_stop_of_the_model_is_compared_with_the_fastest_drive(
         assert not [w for w in warnings_of(scene, build(scene).world.setup) if "stop" in w]
 
 
+def test_a_motion_beyond_a_stop_is_said(written: Written) -> None:
+    limit = 'type="slide" axis="1 0 0"'
+    path = written(BEAT, WING.replace(limit, f'{limit} range="-0.03 0.06"'))
+    scene = load_scene(path)
+    (said,) = [w for w in warnings_of(scene, build(scene).world.setup) if "range" in w]
+    assert "joint 'stroke' moves to -0.05 m, 0.02 m beyond its range, and its stop" in said
+    path.with_name("model.xml").write_text(WING.replace(limit, f'{limit} range="-0.05 0.05"'))
+    scene = load_scene(path)
+    assert not [w for w in warnings_of(scene, build(scene).world.setup) if "range" in w]
+
+
 def test_joints_of_a_loop_are_not_undriven_and_cannot_be_held(written: Written) -> None:
     """A coupler that is held in the driven linkage was 199 mm off its pin, and all was "done"."""
     path = written(LINKAGE, FOUR_BAR)

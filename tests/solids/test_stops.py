@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from flowborne.solids.driven import drive, within_limits
 from flowborne.solids.dynamics import SolidSystem, assemble
 from flowborne.solids.model import SolidModel, SolidState
+from flowborne.solids.prescribed import Driven
 
 WHEEL = """<mujoco><worldbody><body><joint axis="0 0 1" range="-45 45" {stop}/>
 <geom type="cylinder" size=".1 .05" mass="2"/></body></worldbody></mujoco>"""
@@ -84,6 +86,26 @@ def test_a_softer_stop_of_the_model_is_kept() -> None:
     )
     places, _ = moved(model, 10.0, 0.0, 1e-4, 4000)
     assert places.max() - np.radians(45.0) == pytest.approx(10.0 * 0.1 / np.e, rel=0.01)
+
+
+def test_a_drive_of_limited_torque_ends_at_its_stop() -> None:
+    """It pushes on with its limit, 0.5 N m, where the stop keeps it from its velocity."""
+    model = SolidModel.from_string(WHEEL.format(stop=""), gravity=(0.0, 0.0, 0.0))
+    state, limit, none, dt = model.rest(), np.array([0.5]), np.zeros(1), 1e-3
+    state.v[0] = 5.0
+    for _ in range(400):
+        before = state.copy()
+        state.q = model.integrate(state.q, state.v, dt)
+        turns = drive(model, state, none, dt, before, np.array([True]), np.array([5.0]), limit)
+        found: Driven | None = turns
+        while found is not None:
+            turns, v = found, found.velocity
+            found = turns.updated(v) or within_limits(turns, limit, v, turns.actuator(v, none))
+        state.v = turns.velocity
+        assert state.q[0] < np.radians(45.0) + 0.05 * 5.0 * dt
+    assert state.q[0] == pytest.approx(np.radians(45.0), abs=1e-4)
+    assert abs(state.v[0]) < 1e-9
+    np.testing.assert_allclose(turns.actuator(state.v, none), limit)
 
 
 def test_stops_of_exact_drives_stay_as_they_are() -> None:

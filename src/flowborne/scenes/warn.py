@@ -32,7 +32,7 @@ from flowborne.scenes.warn_bodies import (
     thin_bodies,
 )
 from flowborne.scenes.warn_speed import fast_bodies, fast_flow, unlike_the_sea
-from flowborne.scenes.warn_stops import soft_stops
+from flowborne.scenes.warn_stops import past_stops, soft_stops
 from flowborne.solids.model import SLIDE, joint_kind, joint_unit
 
 LEAST_STRENGTH = 2.0 * math.pi
@@ -161,6 +161,7 @@ WARNINGS: tuple[Warn, ...] = (
     limp_joints,
     holding_nothing,
     soft_stops,
+    past_stops,
     lying,
     unlike_the_sea,
 )

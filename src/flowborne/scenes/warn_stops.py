@@ -1,4 +1,4 @@
-"""Warnings about stops of the model that are soft for the motions of a scene."""
+"""Warnings about stops of the model that are soft for the motions of a scene, or in their way."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ import numpy as np
 from flowborne.base.phrases import listed, rounded_down
 from flowborne.coupling.world import Setup
 from flowborne.motion.tracks import SPEED_SAMPLES
-from flowborne.scenes.bodies import driven_dofs
+from flowborne.scenes.bodies import driven_dofs, initial_state
 from flowborne.scenes.schema import Scene
+from flowborne.solids.passed import Passed, passed_stops
 from flowborne.solids.scratch import DEFAULT_SOLREF, STOP_STEPS, time_constant
 from flowborne.solids.trajectories import Trajectory
 
@@ -51,6 +52,31 @@ def soft_stops(scene: Scene, setup: Setup) -> Iterator[str]:
         f'solreflimit = "{rounded_down(SOFT * period)} 1" in the model will do, and without it a '
         "stop is as stiff as the step allows"
     )
+
+
+def past_stops(scene: Scene, setup: Setup) -> Iterator[str]:
+    """Prescribed motions that take their joints beyond their ranges."""
+    model, found = setup.solid, dict[str, Passed]()
+    if not setup.motions or not model.mj.jnt_limited.any():
+        return
+    driven, q = driven_dofs(scene, model, setup.motions), initial_state(scene, model).q
+    with suppress(ArithmeticError):
+        for time in np.linspace(0.0, scene.time.frames * scene.frame_time, SPEED_SAMPLES):
+            for motion in setup.motions:
+                q[model.indices_of(motion.dofs)] = motion.position(float(time))
+            for passed in passed_stops(model, q):
+                moved = passed.joint >= 0 and driven[model.mj.jnt_dofadr[passed.joint]]
+                known = found.get(passed.name, passed)
+                if moved and passed.amount >= max(passed.allowed, known.amount):
+                    found[passed.name] = passed
+    if found:
+        worst = max(found.values(), key=lambda passed: passed.amount / passed.allowed)
+        more = f" ({len(found) - 1} more too)" if len(found) > 1 else ""
+        yield (
+            f"[solids]: {worst.name} moves to {worst.said(worst.place)}, "
+            f"{worst.said(worst.amount)} beyond its range{more}, and its stop pushes against its "
+            "drive; a wider range in the model will do, or a motion within it"
+        )
 
 
 def period_of(motion: Trajectory, length: float, step: float) -> float:
