@@ -18,6 +18,7 @@ from flowborne.scenes.draft import Draft
 from flowborne.scenes.earlier import earlier_joints, earlier_motion
 from flowborne.scenes.flesh import grow
 from flowborne.scenes.schema import Scene
+from flowborne.scenes.schema_bodies import named_holds
 from flowborne.solids import mjcf
 from flowborne.solids.actuators import actuators
 from flowborne.solids.following import follow, posed_flesh
@@ -46,9 +47,6 @@ from flowborne.solids.trajectories import (
 
 MODEL = "gravity", "dimensions", "plugins", "solids", "shapes", "flesh", "human", "clip", "earlier"
 """Keys of a scene on which its model depends."""
-
-ROOT = "root"
-"""Name in [solids] hold of the free joints by which bodies float, where no joint has it."""
 
 
 def load_model(scene: Scene) -> SolidModel:
@@ -209,7 +207,7 @@ def check_initial(draft: Draft, around: Surroundings) -> Iterator[str]:
             f"{draft.at('initial', 'impulse')}: 'none' is for creatures that float, and the model "
             "has no free joint. Drop it."
         )
-    kept = named_holds(draft.scene, model)
+    kept = named_holds(draft.scene.solids, model)
     for joint in kept:
         floats = joint in model.joint_names and joint_kind(model, joint) == FREE
         if floats and initial.impulse == "none":
@@ -335,17 +333,6 @@ def undriven(scene: Scene, model: SolidModel, motions: Iterable[Trajectory]) -> 
     return limp
 
 
-def named_holds(scene: Scene, model: SolidModel) -> tuple[str, ...]:
-    """Joints that [solids] hold names; "root" is every free joint of a model without that joint."""
-    hold = () if scene.solids is None else scene.solids.hold
-    if isinstance(hold, bool):
-        return ()
-    free = [joint for joint in model.joint_names if joint_kind(model, joint) == FREE]
-    if ROOT in hold and ROOT not in model.joint_names and free:
-        hold = (*(joint for joint in hold if joint != ROOT), *free)
-    return tuple(dict.fromkeys(hold))
-
-
 def held_joints(model: SolidModel, motions: Iterable[Trajectory]) -> list[str]:
     """Joints that [solids] hold keeps, of all motions of a scene."""
     inner = (m.trajectory if isinstance(m, TrajectoryServo) else m for m in motions)
@@ -373,7 +360,7 @@ def held(
 
     A joint's position actuator becomes its servo; without one the servo is exact.
     """
-    hold = named_holds(scene, model)
+    hold = named_holds(scene.solids, model)
     if scene.solids is not None and scene.solids.hold is True:
         hold = tuple(undriven(scene, model, motions))
     servos: dict[str, Servo] = {

@@ -9,14 +9,7 @@ import numpy as np
 from flowborne.control.surroundings import Surroundings
 from flowborne.coupling.world import Setup
 from flowborne.motion.clip import Clip
-from flowborne.scenes.bodies import (
-    ROOT,
-    check_initial,
-    initial_state,
-    load_model,
-    named_holds,
-    posed,
-)
+from flowborne.scenes.bodies import check_initial, initial_state, load_model, posed
 from flowborne.scenes.build import mouths_of, surroundings_of
 from flowborne.scenes.capture import capture_of, clip_motion
 from flowborne.scenes.control import check_control
@@ -26,7 +19,7 @@ from flowborne.scenes.flesh import check_flesh, check_flesh_places
 from flowborne.scenes.fluid import check_dimensions, check_fluid, check_followed, fluid_of
 from flowborne.scenes.motions import MotionFormulaTable, check_formulas, check_motions
 from flowborne.scenes.mouths import check_mouth_cells, check_mouths
-from flowborne.scenes.schema_bodies import ClipTable
+from flowborne.scenes.schema_bodies import ROOT, ClipTable, named_holds
 from flowborne.solids.loops import tied_joints
 from flowborne.solids.model import HINGE, SLIDE, SolidModel, joint_kind, joint_unit
 from flowborne.solids.surfaces import geom_boxes
@@ -143,8 +136,9 @@ def _unheld(draft: Draft, around: Surroundings) -> list[str]:
     where, problems = draft.at("solids", "hold"), []
     moved = {table.joint: "a [[motion]]" for table in scene.motion}
     moved |= dict.fromkeys(scene.controlled_joints(), "[[control]]")
+    moved |= dict.fromkeys(earlier_joints(scene), "a motion of the [earlier] run")
     tied = tied_joints(model)
-    for joint in named_holds(scene, model):
+    for joint in named_holds(scene.solids, model):
         if joint in moved:
             problems.append(f"{where}: joint '{joint}' has {moved[joint]}. Keep one of them.")
         elif joint in tied:
@@ -273,6 +267,7 @@ def check_followers(draft: Draft, around: Surroundings) -> Iterator[str]:
     assert capture is not None
     others = scene.moved_joints() | dict.fromkeys(scene.clip.free, "free")
     others |= dict.fromkeys(earlier_joints(scene), "moved by the [earlier] run")
+    others |= dict.fromkeys(named_holds(scene.solids, model), "held")
     named = (*scene.clip.mapping, *(scene.clip.joints or ()), *scene.clip.free)
     unknown = draft.said(around.unknown_joints(named), "clip")
     yield from unknown
