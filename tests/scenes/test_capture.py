@@ -281,6 +281,22 @@ def test_any_creature_follows_by_a_mapping_of_its_own(write: Write) -> None:
         assert motion.position(frame * clip.frame_time) == pytest.approx(angle, abs=1e-6)
 
 
+def test_a_held_joint_does_not_follow(write: Write) -> None:
+    """By the name of its free joint, or as "root", a creature is held while its limbs move."""
+    floating = ARM.replace(
+        '<body name="upper">', '<freejoint name="trunk"/><geom size="0.1"/>\n<body name="upper">'
+    )
+    mapped = '[clip.mapping]\ntrunk = "root"\nswing = "left_shoulder"\n'
+    for hold, names in (("trunk", ["swing"]), ("root", ["swing"]), ("swing", ["trunk"])):
+        path = write(f'[solids]\nmodel = "arm.xml"\nhold = ["{hold}"]\n{mapped}', {"[human]\n": ""})
+        path.with_name("arm.xml").write_text(floating)
+        motion, still = built(path).world.setup.motions
+        assert list(motion.columns.names) == names
+        np.testing.assert_array_equal(still.velocity(0.5), np.zeros(len(still.dofs)))
+    (problem,) = check_scene(path, {"clip.joints": '["swing"]'})
+    assert "[clip] joints: joint 'swing' is held as well" in problem
+
+
 def test_a_human_or_a_start_with_a_fault_beside_a_walk_is_told(tmp_path: Path) -> None:
     walk = "gravity = [0.0, 0.0, -9.81]\n[time]\nframes_per_second = 30.0\nframes = 2\n[clip]\n"
     faults = {

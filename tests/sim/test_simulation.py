@@ -6,7 +6,7 @@ import pytest
 import flowborne
 from flowborne.coupling.report import Outcome
 from flowborne.sim import simulation as module
-from flowborne.sim.simulation import BlowUpError, Simulation, default_workers, turning_dofs
+from flowborne.sim.simulation import BlowUpError, Simulation, default_workers
 
 
 def state_of(world):
@@ -176,7 +176,7 @@ def test_no_worker_is_refused(small_scene):
 
 
 def test_rotations_are_told_from_translations():
-    from flowborne.solids.model import SolidModel
+    from flowborne.solids.model import SolidModel, turning_dofs
 
     model = SolidModel.from_string(
         """<mujoco><worldbody>

@@ -30,12 +30,14 @@ CROWD = """<mujoco><worldbody><geom type="plane" size="5 5 .1" pos="0 0 -.6"/>
 <body pos="0 0 .4"><joint type="ball" damping=".3" stiffness="2"/>
 <geom type="box" size=".1 .2 .3" mass="2"/>
 <body pos=".5 0 0"><joint axis="0 1 0" damping=".2" stiffness="5" springref="10" armature=".1"
-range="-3 3" frictionloss=".4"/><geom type="sphere" size=".2" mass="1"/></body></body></body>
+range="-3 3" solreflimit=".019 1" frictionloss=".4"/><geom type="sphere" size=".2" mass="1"/>
+</body></body></body>
 </worldbody></mujoco>"""
 
 SLAB = """<mujoco><worldbody><geom type="plane" size="9 9 .1" euler="-90 0 0" pos="0 -.2 0"/>
 <body><joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 1 0"/><joint axis="0 0 1"/>
-<geom type="box" size=".3 .1 .1"/><body pos=".3 0 0"><joint axis="0 0 1" range="-5 5"/>
+<geom type="box" size=".3 .1 .1"/><body pos=".3 0 0">
+<joint axis="0 0 1" range="-5 5" solreflimit=".019 1"/>
 <geom type="capsule" fromto="0 0 0 .5 0 0" size=".1"/></body></body></worldbody></mujoco>"""
 
 FLOATING = """<mujoco><worldbody><body><freejoint/><geom type="capsule" fromto="0 0 0 1 0 0"

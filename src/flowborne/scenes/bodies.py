@@ -18,10 +18,12 @@ from flowborne.scenes.draft import Draft
 from flowborne.scenes.earlier import earlier_joints, earlier_motion
 from flowborne.scenes.flesh import grow
 from flowborne.scenes.schema import Scene
+from flowborne.scenes.schema_bodies import named_holds
 from flowborne.solids import mjcf
 from flowborne.solids.actuators import actuators
 from flowborne.solids.following import follow, posed_flesh
 from flowborne.solids.geoms import floors
+from flowborne.solids.loops import tied_joints
 from flowborne.solids.mjcf import Given, MjModel, MjSpec, compiled_quietly
 from flowborne.solids.model import (
     BALL,
@@ -34,7 +36,14 @@ from flowborne.solids.model import (
     joint_kind,
     joint_unit,
 )
-from flowborne.solids.trajectories import Servo, ServoExact, ServoPD, Trajectory, driven
+from flowborne.solids.trajectories import (
+    Servo,
+    ServoExact,
+    ServoPD,
+    Trajectory,
+    TrajectoryServo,
+    driven,
+)
 
 MODEL = "gravity", "dimensions", "plugins", "solids", "shapes", "flesh", "human", "clip", "earlier"
 """Keys of a scene on which its model depends."""
@@ -198,6 +207,19 @@ def check_initial(draft: Draft, around: Surroundings) -> Iterator[str]:
             f"{draft.at('initial', 'impulse')}: 'none' is for creatures that float, and the model "
             "has no free joint. Drop it."
         )
+    kept = named_holds(draft.scene.solids, model)
+    for joint in kept:
+        floats = joint in model.joint_names and joint_kind(model, joint) == FREE
+        if floats and initial.impulse == "none":
+            yield (
+                f"{draft.at('initial', 'impulse')}: 'none' is for creatures that float, and "
+                f"[solids] holds '{joint}'. Drop one of them."
+            )
+        if any(initial.velocities.get(joint, ())):
+            yield (
+                f"{draft.at('initial', 'velocities')}: [solids] holds joint '{joint}', which has "
+                "no velocity then. Drop one of them."
+            )
     moved = {table.joint: "a [[motion]]" for table in draft.scene.motion}
     moved |= dict.fromkeys(earlier_joints(draft.scene), "a motion of the [earlier] run")
     for key, values in (("positions", initial.positions), ("velocities", initial.velocities)):
@@ -290,9 +312,10 @@ def undriven(scene: Scene, model: SolidModel, motions: Iterable[Trajectory]) -> 
     """Joints between bodies without a drive and without stiffness.
 
     Joints on the world are left out, as creatures float or swing on them, and so are joints between
-    bones of the same flesh, which stiffens them.
+    bones of the same flesh, which stiffens them, and those that an equality ties to others.
     """
     mj, moved, limp = model.mj, driven_dofs(scene, model, motions), []
+    tied = tied_joints(model)
     for j, name in enumerate(model.joint_names):
         body = int(mj.jnt_bodyid[j])
         if body >= model.nbody or mj.jnt_type[j] not in (HINGE, SLIDE, BALL):
@@ -301,12 +324,33 @@ def undriven(scene: Scene, model: SolidModel, motions: Iterable[Trajectory]) -> 
         ends = {model.body_names[body], model.body_names[parent]}
         if (
             parent > 0
+            and name not in tied
             and mj.jnt_stiffness[j] == 0.0
             and not moved[model.dofs_of(name)].all()
             and not any(ends <= set(flesh.bones) for flesh in scene.flesh)
         ):
             limp.append(name)
     return limp
+
+
+def held_joints(model: SolidModel, motions: Iterable[Trajectory]) -> list[str]:
+    """Joints that [solids] hold keeps, of all motions of a scene."""
+    inner = (m.trajectory if isinstance(m, TrajectoryServo) else m for m in motions)
+    first = [int(m.dofs[0]) for m in inner if isinstance(m, TrajectoryHeld)]
+    return [model.joint_names[model.mj.dof_jntid[dof]] for dof in first]
+
+
+def left_free(scene: Scene, model: SolidModel, motions: Iterable[Trajectory]) -> list[str]:
+    """Joints on the world that nothing drives or ties: bodies float, slide or swing on them."""
+    moved, tied = driven_dofs(scene, model, motions), tied_joints(model)
+    return [
+        name
+        for j, name in enumerate(model.joint_names)
+        if model.mj.body_parentid[model.mj.jnt_bodyid[j]] == 0
+        and name not in tied
+        and model.mj.jnt_bodyid[j] < model.nbody
+        and not moved[model.dofs_of(name)].all()
+    ]
 
 
 def held(
@@ -316,9 +360,9 @@ def held(
 
     A joint's position actuator becomes its servo; without one the servo is exact.
     """
-    hold = () if scene.solids is None else scene.solids.hold
-    if isinstance(hold, bool):
-        hold = tuple(undriven(scene, model, motions)) if hold else ()
+    hold = named_holds(scene.solids, model)
+    if scene.solids is not None and scene.solids.hold is True:
+        hold = tuple(undriven(scene, model, motions))
     servos: dict[str, Servo] = {
         a.joint: ServoPD(a.frequency, a.limit or math.inf)
         for a in actuators(model)

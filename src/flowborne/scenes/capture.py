@@ -17,7 +17,7 @@ from flowborne.motion.human.gait import gait_clip
 from flowborne.motion.human.skeleton import SIDES, standard_skeleton
 from flowborne.scenes.earlier import earlier_joints
 from flowborne.scenes.schema import Scene
-from flowborne.scenes.schema_bodies import HumanTable
+from flowborne.scenes.schema_bodies import HumanTable, named_holds
 from flowborne.solids.model import SolidModel
 
 
@@ -100,6 +100,7 @@ def followers(scene: Scene, capture: Capture, model: SolidModel) -> tuple[str, .
     """Joints of the model that follow the clip, in the model's order."""
     assert scene.clip is not None
     taken = {*scene.moved_joints(), *scene.clip.free, *earlier_joints(scene)}
+    taken |= {*named_holds(scene.solids, model)}
     chosen = capture.mapping if scene.clip.joints is None else scene.clip.joints
     return tuple(
         joint

@@ -19,8 +19,9 @@ from flowborne.scenes.flesh import check_flesh, check_flesh_places
 from flowborne.scenes.fluid import check_dimensions, check_fluid, check_followed, fluid_of
 from flowborne.scenes.motions import MotionFormulaTable, check_formulas, check_motions
 from flowborne.scenes.mouths import check_mouth_cells, check_mouths
-from flowborne.scenes.schema_bodies import ClipTable, SolidsTable
-from flowborne.solids.model import FREE, HINGE, SLIDE, SolidModel, joint_kind, joint_unit
+from flowborne.scenes.schema_bodies import ROOT, ClipTable, named_holds
+from flowborne.solids.loops import tied_joints
+from flowborne.solids.model import HINGE, SLIDE, SolidModel, joint_kind, joint_unit
 from flowborne.solids.surfaces import geom_boxes
 
 FLOAT32_ROUNDING = float(np.finfo(np.float32).eps)
@@ -107,7 +108,7 @@ def check_bodies(draft: Draft, around: Surroundings) -> Iterator[str]:
     named, output, followed = [], scene.output, {scene.film.camera.follow} - {"bodies", "nothing"}
     if scene.solids is not None:
         named += draft.said(around.unknown_bodies(scene.solids.densities), "solids", "densities")
-        named += _unheld(draft, scene.solids, around)
+        named += _unheld(draft, around)
     named += draft.said(around.unknown_bodies(output.bodies), "output", "bodies")
     if not isinstance(output.joints, bool):
         named += draft.said(around.unknown_joints(output.joints), "output", "joints")
@@ -129,19 +130,26 @@ def check_bodies(draft: Draft, around: Surroundings) -> Iterator[str]:
         yield from _check_places(draft, model)
 
 
-def _unheld(draft: Draft, solids: SolidsTable, around: Surroundings) -> list[str]:
+def _unheld(draft: Draft, around: Surroundings) -> list[str]:
     """Joints of [solids] hold that cannot be held."""
-    scene, hold = draft.scene, () if isinstance(solids.hold, bool) else solids.hold
+    scene, model = draft.scene, around.model
     where, problems = draft.at("solids", "hold"), []
     moved = {table.joint: "a [[motion]]" for table in scene.motion}
     moved |= dict.fromkeys(scene.controlled_joints(), "[[control]]")
-    for joint in hold:
-        unknown = draft.said(around.unknown_joints([joint]), "solids", "hold")
-        problems += unknown
-        if not unknown and joint_kind(around.model, joint) == FREE:
-            problems.append(f"{where}: '{joint}' is a free joint, by which a body floats. Drop it.")
-        elif joint in moved:
+    moved |= dict.fromkeys(earlier_joints(scene), "a motion of the [earlier] run")
+    tied = tied_joints(model)
+    for joint in named_holds(scene.solids, model):
+        if joint in moved:
             problems.append(f"{where}: joint '{joint}' has {moved[joint]}. Keep one of them.")
+        elif joint in tied:
+            problems.append(
+                f"{where}: joint '{joint}' is {tied[joint]}, which a held joint would pull open. "
+                "Take it out: what ties it moves it."
+            )
+        elif joint == ROOT and ROOT not in model.joint_names:
+            problems.append(f"{where}: there is no free joint to hold as '{ROOT}'. Drop it.")
+        else:
+            problems += draft.said(around.unknown_joints([joint]), "solids", "hold")
     return problems
 
 
@@ -259,6 +267,7 @@ def check_followers(draft: Draft, around: Surroundings) -> Iterator[str]:
     assert capture is not None
     others = scene.moved_joints() | dict.fromkeys(scene.clip.free, "free")
     others |= dict.fromkeys(earlier_joints(scene), "moved by the [earlier] run")
+    others |= dict.fromkeys(named_holds(scene.solids, model), "held")
     named = (*scene.clip.mapping, *(scene.clip.joints or ()), *scene.clip.free)
     unknown = draft.said(around.unknown_joints(named), "clip")
     yield from unknown

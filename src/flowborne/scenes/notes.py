@@ -19,7 +19,14 @@ from flowborne.motion.clip_reading import (
 )
 from flowborne.motion.human.clip_skeleton import lost_bones
 from flowborne.motion.human.skeleton import PARENTS
-from flowborne.scenes.bodies import own_pose, posed, spec_of
+from flowborne.scenes.bodies import (
+    held_joints,
+    left_free,
+    own_pose,
+    posed,
+    spec_of,
+    trajectories_of,
+)
 from flowborne.scenes.capture import capture_of
 from flowborne.scenes.dye import DyeBox
 from flowborne.scenes.earlier import earlier_of
@@ -43,6 +50,7 @@ def notes_of(scene: Scene, model: SolidModel) -> Iterator[str]:
             f"at rest: {listed(joined)}"
         )
     yield from _moved_into_range(scene, model)
+    yield from _held(scene, model)
     yield from clip_notes(scene)
     yield from _standing_still(scene)
     yield from _wide_probes(scene, model)
@@ -94,6 +102,18 @@ def _moved_into_range(scene: Scene, model: SolidModel) -> Iterator[str]:
         yield (
             "[initial]: joints that the model has outside their ranges start within: "
             f"{listed(moved)}"
+        )
+
+
+def _held(scene: Scene, model: SolidModel) -> Iterator[str]:
+    """Which joints hold = true holds, and which it leaves free."""
+    if scene.solids is None or scene.solids.hold is not True:
+        return
+    motions = trajectories_of(scene, model, posed(scene, model).q)
+    if held := held_joints(model, motions):
+        free = left_free(scene, model, motions)
+        yield f"[solids]: hold = true holds {listed(held)}" + (
+            f", and not {listed(free)} on the world" if free else ""
         )
 
 

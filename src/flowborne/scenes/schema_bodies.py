@@ -29,6 +29,7 @@ from flowborne.base.tables import (
 from flowborne.kernels.arrays import Array
 from flowborne.shapes.own import SHAPES, PlacedShape
 from flowborne.solids.displacing import Displace
+from flowborne.solids.model import FREE, SolidModel, joint_kind
 
 
 class DisplaceTable(Table):
@@ -63,8 +64,10 @@ class SolidsTable(Table):
                a free joint of its own name
     displace   which geoms the fluid meets
     hold       joints that stay as they start: true for all between bodies that nothing else drives
-               and no spring holds, or names. A position actuator of the model on such a joint
-               becomes its "pd" servo, with the actuator's stiffness and largest force
+               and no spring holds, or names; "root" is the free joint by which a body floats. A
+               joint in a loop that an equality closes cannot be held. A position actuator of the
+               model on a held joint becomes its "pd" servo, with the actuator's stiffness and
+               largest force
     packages   folders in which `package://name/...` of a URDF is looked for, besides those above
                it: each holds the package's folder, or is it
     mend       "hull": open meshes are replaced by their convex hulls. Holes up to a twentieth of
@@ -79,6 +82,19 @@ class SolidsTable(Table):
     hold: SwitchOrNames = False
     packages: tuple[FileName, ...] = ()
     mend: Literal["hull"] | None = None
+
+
+ROOT = "root"
+"""Name in [solids] hold of the free joints by which bodies float, where no joint has it."""
+
+
+def named_holds(solids: SolidsTable | None, model: SolidModel) -> tuple[str, ...]:
+    """Joints that [solids] hold names; "root" is every free joint of a model without that joint."""
+    hold = () if solids is None or isinstance(solids.hold, bool) else solids.hold
+    free = [joint for joint in model.joint_names if joint_kind(model, joint) == FREE]
+    if ROOT in hold and ROOT not in model.joint_names and free:
+        hold = (*(joint for joint in hold if joint != ROOT), *free)
+    return tuple(dict.fromkeys(hold))
 
 
 class ShapeTable(Table, OwnTable):
@@ -196,7 +212,7 @@ class ClipTable(Table):
     offset       m; moves the clip after that
     mapping      joint of the model -> joint of the clip, where their names do not tell
     joints       joints of the model that follow; unless given all that the clip has and that are
-                 not controlled, moved by a [[motion]] or free
+                 not controlled, moved by a [[motion]], held by name or free
     free         joints that the clip has and that start as it does, but then go where forces take
                  them: a root that is free floats
     """

@@ -6,6 +6,7 @@ value, and after a semicolon a value that would do. A kind of warning is a funct
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Callable, Iterator
 
@@ -16,7 +17,7 @@ from flowborne.control.objective_kinds import ObjectiveInputMotionTable
 from flowborne.coupling.world import TRIAL_TOLERANCE, Setup
 from flowborne.motion.clip_reading import MIN_STANDING_COSINE, standing_axis
 from flowborne.motion.tracks import SPEED_SAMPLES
-from flowborne.scenes.bodies import undriven
+from flowborne.scenes.bodies import held_joints, left_free, undriven
 from flowborne.scenes.build import surroundings_of
 from flowborne.scenes.capture import capture_of
 from flowborne.scenes.motions import ServoPDTable
@@ -31,6 +32,7 @@ from flowborne.scenes.warn_bodies import (
     thin_bodies,
 )
 from flowborne.scenes.warn_speed import fast_bodies, fast_flow, unlike_the_sea
+from flowborne.scenes.warn_stops import past_stops, soft_stops
 from flowborne.solids.model import SLIDE, joint_kind, joint_unit
 
 LEAST_STRENGTH = 2.0 * math.pi
@@ -114,6 +116,20 @@ def limp_joints(scene: Scene, setup: Setup) -> Iterator[str]:
         )
 
 
+def holding_nothing(scene: Scene, setup: Setup) -> Iterator[str]:
+    """A hold = true in a model that has no joint for it."""
+    if scene.solids is None or scene.solids.hold is not True:
+        return
+    if held_joints(setup.solid, setup.motions):
+        return
+    free = left_free(scene, setup.solid, setup.motions)
+    tip = f"hold = {json.dumps(free)} holds {listed(free)}" if free else "drop it"
+    yield (
+        "[solids]: hold = true holds no joint: it is for those between bodies that nothing drives, "
+        f"and not for joints on the world or in a loop; {tip}"
+    )
+
+
 def lying(scene: Scene, setup: Setup) -> Iterator[str]:
     """A person who would stand with another axis of the file up."""
     capture = capture_of(scene)
@@ -143,6 +159,9 @@ WARNINGS: tuple[Warn, ...] = (
     angles_in_radians,
     too_slow,
     limp_joints,
+    holding_nothing,
+    soft_stops,
+    past_stops,
     lying,
     unlike_the_sea,
 )

@@ -25,7 +25,9 @@ from flowborne.runs.history import History
 from flowborne.runs.recorder import Recorder, write_model
 from flowborne.runs.run_folder import RunFolder, RunFolderError, cannot_write, check_space
 from flowborne.runs.states import check_states
+from flowborne.runs.strained import strained
 from flowborne.runs.summary import doubts_of, peak_memory, summarise, versions
+from flowborne.scenes.bodies import driven_dofs
 from flowborne.scenes.creature import creature_of
 from flowborne.scenes.earlier import earlier_joints
 from flowborne.scenes.notes import notes_of
@@ -414,9 +416,13 @@ class _Run:
 
     def _doubts(self) -> list[str]:
         """Reasons not to trust the frames so far, including those of earlier runs in the folder."""
-        model, fluid = self.simulation.setup.solid, self.simulation.setup.fluid
+        simulation = self.simulation
+        setup, scene = simulation.setup, simulation.scene
+        model, dt = setup.solid, simulation.frame_time / simulation.steps_per_frame
         bodies = [model.body_names[body] for body in np.flatnonzero(model.met & model.moving)]
-        return doubts_of(self.folder.history, bodies, fluid)
+        found = doubts_of(self.folder.history, bodies, setup.fluid)
+        driven = driven_dofs(scene, model, setup.motions)
+        return [*found, *strained(self.folder.state_files(), model, driven, dt)]
 
     def _rows(self) -> int:
         """Number of frames in the history."""

@@ -20,7 +20,7 @@ from flowborne.coupling.report import BREAKDOWNS, Outcome, StepReport
 from flowborne.coupling.stream import FlowState, flow_at
 from flowborne.coupling.world import Setup, World
 from flowborne.fluid.boundary import SIDES
-from flowborne.kernels.arrays import PRESCRIBED, Array, Integers, Mask
+from flowborne.kernels.arrays import PRESCRIBED, Array, Integers
 from flowborne.kernels.faces import is_finite
 from flowborne.kernels.jit import LARGE, cores, kernel_threads
 from flowborne.runs.summary import BUDGET_OPEN
@@ -28,7 +28,7 @@ from flowborne.scenes.changes import ChangeTable, values_at
 from flowborne.sim.columns import Columns
 from flowborne.sim.frame import PARTS, FrameReport, Snapshot
 from flowborne.solids.flesh import inversion
-from flowborne.solids.model import FREE, SLIDE
+from flowborne.solids.model import FREE, turning_dofs
 from flowborne.solids.sensed import BodyState, JointState
 from flowborne.solids.surfaces import geom_boxes
 from flowborne.solids.trajectories import NOTHING_TOLD
@@ -36,7 +36,6 @@ from flowborne.solids.trajectories import NOTHING_TOLD
 if TYPE_CHECKING:
     from flowborne.control.controller import Controller
     from flowborne.scenes.schema import Scene
-    from flowborne.solids.model import SolidModel
     from flowborne.solids.trajectories import JointCommand
 
 Step = Callable[[World, float, "JointCommand | None"], StepReport]
@@ -454,13 +453,6 @@ def _listed(world: World, dofs: Integers) -> str:
     names = [world.setup.solid.dof_names[dof] for dof in dofs[:LISTED]]
     more = len(dofs) - len(names)
     return ", ".join(names) + (f" and {more} more" if more else "")
-
-
-def turning_dofs(model: SolidModel) -> Mask:
-    """(nv,) which dofs are rotations: hinges, balls and the last three of free joints."""
-    kind, first = model.mj.jnt_type[model.mj.dof_jntid], model.mj.jnt_dofadr[model.mj.dof_jntid]
-    of_free = np.arange(model.nv) - first >= 3
-    return np.asarray(np.where(kind == FREE, of_free, kind != SLIDE))
 
 
 def default_workers(joints: int, fluid: bool) -> int:

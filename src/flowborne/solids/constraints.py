@@ -5,7 +5,7 @@ Method: docs/method/contact.md.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
@@ -89,21 +89,54 @@ def rows_of(model: SolidModel, s: Scratch) -> tuple[Rows | None, Integers]:
     if count == 0:
         return None, np.zeros(0, np.int64)
     kind = data.efc_type
-    if mujoco.mj_isSparse(s.mj):
-        J = np.zeros((count, model.nv))
-        row = np.repeat(np.arange(count), data.efc_J_rownnz)
-        J[row, data.efc_J_colind[: len(row)]] = data.efc_J[: len(row)]
-    else:
-        J = np.array(data.efc_J).reshape(count, model.nv)
     rows = Rows(
-        J,
+        row_jacobian(s.mj, data),
         np.array(data.efc_D),
         np.array(data.efc_aref),
         np.array(data.efc_frictionloss),
         KIND_OF_ROW[kind],
         np.where(kind >= FIRST_CONTACT, data.efc_id, -1),
     )
-    return merge_frictionless(rows, data.efc_state.astype(np.int64), s)
+    zones = data.efc_state.astype(np.int64)
+    return merge_frictionless(*stop_in_time(rows, zones, model, s), s)
+
+
+def row_jacobian(mj: mujoco.MjModel, data: mujoco.MjData) -> Array:
+    """(k, nv) Jacobian of MuJoCo's constraint rows."""
+    if not mujoco.mj_isSparse(mj):
+        return np.array(data.efc_J).reshape(data.nefc, mj.nv)
+    J = np.zeros((data.nefc, mj.nv))
+    row = np.repeat(np.arange(data.nefc), data.efc_J_rownnz)
+    J[row, data.efc_J_colind[: len(row)]] = data.efc_J[: len(row)]
+    return J
+
+
+def stop_in_time(
+    rows: Rows, zones: Integers, model: SolidModel, s: Scratch
+) -> tuple[Rows, Integers]:
+    """Let joints with a stiff stop just reach it in the next step, and not pass it.
+
+    MuJoCo's row acts where the gap is less than `margin`, by the force of a spring and a damper at
+    the end of the step: (1 + B dt + K dt^2) aref = -B v - K (gap - margin + dt v). With a time
+    constant of two steps it stops a joint within the way of two steps. In its place
+
+        aref = -(v + gap / dt) / dt ahead of the stop, so that v+ = -gap / dt
+        aref = max(-v / dt, MuJoCo's without the margin) beyond it, so that it comes back
+    """
+    data = s.data
+    at = np.flatnonzero(data.efc_type == mujoco.mjtConstraint.mjCNSTR_LIMIT_JOINT)
+    at = at[s.stiff[data.efc_id[at]]]
+    if not at.size:
+        return rows, zones
+    own, (k, B, impedance, _) = model.mj.jnt_margin[data.efc_id[at]], data.efc_KBIP[at].T
+    gap, early, K = data.efc_pos[at] - own, data.efc_margin[at] - own, k * impedance
+    back = rows.aref[at] - K * early / (1.0 + B * s.dt + K * s.dt**2)
+    stop = -(data.efc_vel[at] + np.maximum(gap, 0.0) / s.dt) / s.dt
+    aref = rows.aref.copy()
+    aref[at] = np.where(gap > 0.0, stop, np.maximum(stop, back))
+    rows = replace(rows, aref=aref)
+    zones[at] = rows.zones(np.array(data.qacc_smooth), zones)[at]
+    return rows, zones
 
 
 def merge_frictionless(rows: Rows, zones: Integers, s: Scratch) -> tuple[Rows, Integers]:

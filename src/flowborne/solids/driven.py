@@ -40,11 +40,12 @@ def drive(
             not reach `hold`, so the first Coriolis forces do not assume that it does
     raises  BreakdownError when the matrix of the free dofs is not positive definite
     """
+    exact = prescribed & np.isinf(limit)
     if model.flesh is not None:
-        flesh = assemble_flesh(model, state, applied, dt, before)
+        flesh = assemble_flesh(model, state, applied, dt, before, exact)
         return prescribe_flesh(flesh, prescribed, hold)
-    guess = np.where(prescribed & np.isinf(limit), hold, state.v)
-    return prescribe(assemble(model, state, applied, dt, before, guess), prescribed, hold)
+    guess = np.where(exact, hold, state.v)
+    return prescribe(assemble(model, state, applied, dt, before, guess, exact), prescribed, hold)
 
 
 def within_limits(driven: Driven, limit: Array, v_plus: Array, actuator: Array) -> Driven | None:

@@ -266,6 +266,7 @@ def assemble(
     dt: float,
     before: SolidState | None = None,
     guess: Array | None = None,
+    exact: Mask | None = None,
 ) -> SolidSystem:
     """System of the bodies alone at `state`, with gravity, springs, limits and contact.
 
@@ -283,12 +284,14 @@ def assemble(
              the half-way velocity of the step; without it, they are those at v, and MuJoCo's
              acceleration solves A a = b
     guess    (nv,) velocity after the step for the first Coriolis forces; v when None
+    exact    (nv,) dofs with a drive of any force, see `Scratch.stiffen`
     raises   ValueError when the model has flesh
     """
     if model.flesh is not None:
         raise ValueError("bones alone were asked for, and the model has flesh. Use assemble_flesh.")
     s = scratch(model)
     s.set_time_step(dt)
+    s.stiffen(state.v, exact)
     s.forward(state.q, state.v, applied)
     mass = s.mass_matrix().copy()
     A, force = _smooth(model, s, mass)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.sparse import csc_array, csr_array, diags_array
 
-from flowborne.kernels.arrays import Array, Indices
+from flowborne.kernels.arrays import Array, Indices, Mask
 from flowborne.solids.constraints import rows_of
 from flowborne.solids.dynamics import System, centred
 from flowborne.solids.model import SolidModel, SolidState
@@ -61,6 +61,7 @@ def assemble_flesh(
     applied: Array,
     dt: float,
     before: SolidState | None = None,
+    exact: Mask | None = None,
 ) -> FleshSystem:
     """System of bones and flesh at `state`, with gravity, springs, dampers, limits and contact.
 
@@ -72,10 +73,11 @@ def assemble_flesh(
 
     applied  (nv,) generalised force, N or N m
     dt       s
-    before   state before the positions moved; as in `assemble`
+    before, exact  as in `assemble`
     """
     s = scratch(model)
     s.set_time_step(dt)
+    s.stiffen(state.v, exact)
     s.smooth_forces(state.q, state.v, applied)
     assert model.flesh is not None
     pattern, damping = model.flesh.pattern, model.flesh.damping

@@ -353,6 +353,13 @@ def joint_unit(model: SolidModel, joint: str) -> float:
     return 1.0 if joint_kind(model, joint) == SLIDE else math.pi / 180.0
 
 
+def turning_dofs(model: SolidModel) -> Mask:
+    """(nv,) which dofs are rotations: hinges, balls and the last three of free joints."""
+    kind, first = model.mj.jnt_type[model.mj.dof_jntid], model.mj.jnt_dofadr[model.mj.dof_jntid]
+    of_free = np.arange(model.nv) - first >= 3
+    return np.asarray(np.where(kind == FREE, of_free, kind != SLIDE))
+
+
 def _bones(mj: mujoco.MjModel, grown: Sequence[Grown]) -> int:
     """Number of bodies before the nodes of flesh. Raises ValueError when some come after."""
     flesh = np.flatnonzero(points_of_flesh(mj, grown))

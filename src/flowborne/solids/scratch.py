@@ -15,11 +15,21 @@ from typing import Protocol
 import mujoco
 import numpy as np
 
-from flowborne.kernels.arrays import Array
+from flowborne.kernels.arrays import Array, Mask
 from flowborne.kernels.momentum import about_origin
 
 # MuJoCo would write a file of warnings about its own solution into the working folder
 mujoco.set_mju_user_warning(logging.getLogger(__name__).debug)
+
+
+DEFAULT_SOLREF = 0.02, 1.0
+"""MuJoCo's default time constant, s, and damping ratio of a constraint."""
+
+STOP_STEPS = 2.0
+"""Steps in the time constant of a stop at that default: as stiff as MuJoCo lets one be."""
+
+ONE_AXIS = mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE
+"""Kinds of joints with one dof."""
 
 
 class Compiled(Protocol):
@@ -35,6 +45,7 @@ class Scratch:
     """MjData and a private MjModel; its time step can be set without effect on other threads.
 
     mj, data    MuJoCo's model and data
+    stiff       (njnt,) joints that stop as stiffly as the step allows, see `stiffen`
     q, v, ...   views into `data`
     momenta     cached half-way momenta by state, see solids.momentum
     """
@@ -43,6 +54,11 @@ class Scratch:
         self.mj = copy.copy(model.mj)
         self.data = data = mujoco.MjData(self.mj)
         self.dt = float(self.mj.opt.timestep)
+        at_default = (model.mj.jnt_solref == DEFAULT_SOLREF).all(axis=1)
+        self._stops = np.flatnonzero(at_default & (model.mj.jnt_limited != 0))
+        self._scalar = np.isin(model.mj.jnt_type[self._stops], ONE_AXIS)
+        self._margin = model.mj.jnt_margin[self._stops]
+        self.stiff: Mask = np.zeros(model.mj.njnt, bool)
         self._root = self.mj.body_rootid[self.mj.dof_bodyid]
         self._mass: Array | None = None
         self.momenta: dict[tuple[bytes, bytes, float], Array] = {}
@@ -59,6 +75,26 @@ class Scratch:
         """Set the time step of implicit terms and constraint references, s."""
         if dt != self.dt:
             self.mj.opt.timestep = self.dt = dt
+
+    def stiffen(self, v: Array, exact: Mask | None) -> None:
+        """Make stops as stiff as the step allows which the model leaves at MuJoCo's default, and
+        give a hinge or slide its row from where the velocity v (nv,) brings it there in two steps.
+
+        At the default of 20 ms a wing that beats 34 times a second passes a stop at 45 degrees by
+        more than 180. Stops of drives that nothing holds up stay as they are, as they add to the
+        drives' forces only.
+
+        exact  (nv,) dofs with such a drive; None without any
+        """
+        stops = self._stops
+        if not stops.size:
+            return
+        first = self.mj.jnt_dofadr[stops]
+        free = np.ones(stops.size, bool) if exact is None else ~exact[first]
+        self.stiff[stops] = free
+        self.mj.jnt_solref[stops, 0] = np.where(free, STOP_STEPS * self.dt, DEFAULT_SOLREF[0])
+        way = STOP_STEPS * self.dt * np.abs(v[first])
+        self.mj.jnt_margin[stops] = self._margin + np.where(free & self._scalar, way, 0.0)
 
     def place(self, q: Array, v: Array | None = None) -> None:
         """Compute all poses at `q`, and all velocities when `v` is given."""
@@ -93,6 +129,12 @@ class Scratch:
         if self._mass.size:
             mujoco.mj_fullM(self.mj, self.data, self._mass)
         return self._mass
+
+
+def time_constant(solref: Array) -> float:
+    """s of a constraint; that of a stiffness k is 1 / sqrt(k)."""
+    first, ratio = float(solref[0]), float(solref[1])
+    return first * ratio if first > 0.0 else 1.0 / max(-first, 1e-12) ** 0.5
 
 
 _local = threading.local()
