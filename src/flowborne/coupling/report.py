@@ -156,6 +156,8 @@ class StepReport:
     contacts         number of active contacts
     fastest          largest speed of the fluid across an open face after the solve, m/s
     seconds          where the time went: advection, viscosity, projection, geometry, solids
+    output           (n,) force of each output of the model's actuators, N or N m
+    output_power     (n,) force times the rate of the actuator's length, W
     limited          (k,) dofs whose torque limit was reached
     unsettled        (k,) dofs whose contacts, joint limits or drives still changed when the step
                      gave up; none when Coriolis forces alone did
@@ -192,6 +194,8 @@ class StepReport:
     contacts: Annotated[int, Joined(last, max)] = 0
     fastest: Annotated[float, Joined(max, max, "m/s")] = 0.0
     seconds: Annotated[dict[str, float], Joined(last)] = field(default_factory=dict)
+    output: Mean = field(default_factory=partial(np.zeros, 0))
+    output_power: Mean = field(default_factory=partial(np.zeros, 0))
     limited: Annotated[Integers, Joined(union)] = field(default_factory=no_dofs)
     unsettled: Annotated[Integers, Joined(last)] = field(default_factory=no_dofs)
 
@@ -219,7 +223,7 @@ class StepReport:
         """What can be sensed of the bodies and joints of `world` after the step."""
         state = self.velocity, self.acceleration, self.dt, self.actuator
         wrenches = self.central_wrench(), self.central_added_mass
-        return Sensed(world.setup.solid, world.solid.q, *state, *wrenches)
+        return Sensed(world.setup.solid, world.solid.q, *state, *wrenches, self.output)
 
 
 def about(wrench: Array, points: Array) -> Array:

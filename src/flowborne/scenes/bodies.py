@@ -19,7 +19,7 @@ from flowborne.scenes.earlier import earlier_joints, earlier_motion
 from flowborne.scenes.flesh import grow
 from flowborne.scenes.schema import Scene
 from flowborne.solids import mjcf
-from flowborne.solids.actuators import actuators
+from flowborne.solids.actuators import actuator_servos
 from flowborne.solids.following import follow, posed_flesh
 from flowborne.solids.geoms import floors
 from flowborne.solids.mjcf import Given, MjModel, MjSpec, compiled_quietly
@@ -321,7 +321,7 @@ def held(
         hold = tuple(undriven(scene, model, motions)) if hold else ()
     servos: dict[str, Servo] = {
         a.joint: ServoPD(a.frequency, a.limit or math.inf)
-        for a in actuators(model)
+        for a in actuator_servos(model)
         if a.kind == "position"
     }
     for joint in hold:

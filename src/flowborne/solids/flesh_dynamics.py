@@ -61,6 +61,7 @@ def assemble_flesh(
     applied: Array,
     dt: float,
     before: SolidState | None = None,
+    added: csr_array | None = None,
 ) -> FleshSystem:
     """System of bones and flesh at `state`, with gravity, springs, dampers, limits and contact.
 
@@ -73,6 +74,7 @@ def assemble_flesh(
     applied  (nv,) generalised force, N or N m
     dt       s
     before   state before the positions moved; as in `assemble`
+    added    as in `assemble`; only entries between dofs of the pattern
     """
     s = scratch(model)
     s.set_time_step(dt)
@@ -82,6 +84,9 @@ def assemble_flesh(
     M, (stiff, elastic) = sparse_mass(model, s), _flesh(model, s)
     whole, half = _jointed(model, s, centred, dt), 0.5 * dt**2 * stiff
     whole[pattern.of_mass] += M.data
+    if added is not None:
+        entries = added.tocoo()
+        whole[pattern.places(*entries.coords)] += entries.data
     whole += half
     whole += 0.5 * dt * damping * stiff
     A, K = pattern.filled(whole), pattern.filled(stiff)
