@@ -276,3 +276,65 @@ def test_an_actuator_and_a_motion_of_one_joint_are_refused(tmp_path: Path) -> No
     )
     with pytest.raises(fb.SceneError, match="drives joint 'elbow', which is moved by a"):
         arm(tmp_path, SCENE_FILTER, more=more)
+
+
+def test_trials_act_with_the_actuators_of_the_world(tmp_path: Path) -> None:
+    """Copies advance their own activations, and the effort of a held joint is the pull of its muscle."""
+    more = """
+[[actuator]]
+name = "lift"
+value = 1.0
+[[control]]
+joints = ["hinge"]
+strength = 60.0
+[[objectives]]
+kind = "effort"
+"""
+    efforts = []
+    for value in ("0.0", "1.0"):
+        with arm(tmp_path, MUSCLES, more=more.replace("1.0", value)) as simulation:
+            for _ in range(4):
+                report = simulation.advance_frame()
+            kept = simulation.world.solid.act.copy()
+            efforts.append(report.objective)
+            assert simulation.controller is not None
+            simulation.controller.decide(simulation.world.copy(), simulation.frame_time, fb.step)
+            np.testing.assert_array_equal(simulation.world.solid.act, kept)
+            assert kept[1] == pytest.approx(float(value), abs=0.1)
+            assert simulation.setup.motions == ()
+    assert efforts[0] == pytest.approx(0.0, abs=1e-12)
+    assert efforts[1] > 1e-3
+
+
+def test_a_mimic_joint_gets_its_share_of_the_torque(tmp_path: Path) -> None:
+    """Two equal flaps, tied by an equality: the motor of one accelerates the inertia of both."""
+    flap = (
+        '<body name="{0}"><joint name="{0}" axis="0 0 1"/>'
+        '<geom type="box" size=".2 .01 .1" pos=".2 0 {1}" density="400"/></body>'
+    )
+    model = (
+        f"<mujoco><worldbody>{flap.format('one', 0)}{flap.format('two', 1)}</worldbody><equality>"
+        '<joint joint1="two" joint2="one" solref="0.002 1"/></equality><actuator>'
+        '<motor name="turn" joint="one"/></actuator></mujoco>'
+    )
+    (tmp_path / "arm.xml").write_text(model)
+    (tmp_path / "arm.toml").write_text(SCENE.format(rate=240, more="").replace("hinge", "one"))
+    text = (tmp_path / "arm.toml").read_text().split("[initial]")[0]
+    (tmp_path / "arm.toml").write_text(text)
+    with Simulation(tmp_path / "arm.toml", workers=1) as simulation:
+        inertia = fb.bodies.mass_matrix(simulation.setup.solid, simulation.world.solid.q)
+        for _ in range(60):
+            simulation.advance_frame({"turn": Control(0.1)})
+        one, two = (simulation.joint(name).velocity[0] for name in ("one", "two"))
+        time = simulation.time - 0.5 * simulation.frame_time
+    assert one == pytest.approx(0.1 * time / inertia.trace(), rel=0.01)
+    assert two == pytest.approx(one, rel=0.01)
+
+
+def test_hold_leaves_the_joints_that_actuators_drive(tmp_path: Path) -> None:
+    more = '[[actuator]]\nname = "flexor"\nvalue = 0.5\n'
+    text = SCENE.replace('model = "arm.xml"', 'model = "arm.xml"\nhold = true')
+    (tmp_path / "arm.xml").write_text(ARM.format(actuators=MUSCLES, sensors=""))
+    (tmp_path / "arm.toml").write_text(text.format(rate=120, more=more))
+    with Simulation(tmp_path / "arm.toml", workers=1) as simulation:
+        assert simulation.setup.motions == ()

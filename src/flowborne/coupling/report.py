@@ -117,7 +117,8 @@ class StepReport:
     velocity         (nv,) at the end of the step: v is that half a step before, then half a step
                      after it, and this is the mean of both
     acceleration     (nv,) change of v in the step by dt
-    actuator         (nv,) generalised force of the drives (and of locked dofs), N or N m
+    actuator         (nv,) generalised force of the drives (and of locked dofs), N or N m; where
+                     there is none, that of the model's actuators
     pressure_wrench  (nbody, 6) force and torque about the world origin of the dynamic pressure
     viscous_wrench   (nbody, 6) the same of the shear stress
     buoyancy_wrench  (nbody, 6) the same of the hydrostatic pressure (Archimedes)
@@ -126,7 +127,7 @@ class StepReport:
     added_mass       of which `added_mass_wrench` is made
     centre           (nbody, 3) centres of mass at the end of the step, m; 0 where neither a fluid
                      nor a wind acts
-    work             of the drives, J
+    work             of the drives and of the model's actuators, J
     momentum_solid   of the bodies half a step on, which keeps what it is given exactly
                      (see solids.momentum.halfway_momentum)
     momentum_fluid   of the fluid (density x control volume of each face)

@@ -56,10 +56,12 @@ def report_bodies(world: World, dt: float, solved: Solved, known: dict[str, Any]
     before, model = solved.driven.system.v, world.setup.solid
     velocity = 0.5 * (before + solved.v)
     actuator = solved.actuator + world.told.force_on(model.nv)
-    outputs, rates = np.zeros((2, model.outputs))
+    work, (outputs, rates) = dt * float(actuator @ velocity), np.zeros((2, model.outputs))
     if world.motors is not None:
         outputs, onto = world.motors.through(solved.v - before)
-        actuator, rates = actuator + onto, world.motors.moment @ velocity
+        rates, work = world.motors.moment @ velocity, work + dt * float(onto @ velocity)
+        own = solved.driven.prescribed | solved.driven.limited
+        actuator = np.where(own, actuator, actuator + onto)
     for number, dof in world.told.servos:
         place, gear = model.mj.actuator_outadr[number], model.mj.actuator_gear[number, 0]
         outputs[place], rates[place] = actuator[dof] / gear, gear * velocity[dof]
@@ -72,7 +74,7 @@ def report_bodies(world: World, dt: float, solved: Solved, known: dict[str, Any]
         velocity,
         (solved.v - before) / dt,
         actuator,
-        work=dt * float(actuator @ velocity),
+        work=work,
         contacts=solved.driven.system.contacts,
         limited=solved.driven.limited.nonzero()[0],
         unsettled=solved.unsettled,

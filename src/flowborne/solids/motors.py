@@ -142,7 +142,9 @@ def motors(model: SolidModel, state: SolidState, controls: Controls, dt: float) 
         force, onto, moment = data.actuator_force.copy(), data.qfrc_actuator.copy(), _moment(s)
         stiff, damped = _yields(s, data.actuator_length), _yields(s, data.actuator_velocity)
         yielding = 0.5 * dt * damped + 0.25 * dt**2 * stiff
-        yielding[_cut_off(s, moment, onto)] = 0.0
+        cut = _cut_off(s, onto)
+    if cut.size:
+        yielding[np.unique(moment[:, cut].nonzero()[0])] = 0.0
     if model.flesh is not None:
         yielding[~_in_pattern(moment, model.flesh.pattern)] = 0.0
     return Motors(force, onto, moment, yielding, dt)
@@ -212,13 +214,12 @@ def _yields(s: Scratch, of: Array) -> Array:
     return np.maximum((forces[1] - forces[0]) / (2.0 * PROBE), 0.0)
 
 
-def _cut_off(s: Scratch, moment: csr_array, onto: Array) -> Integers:
-    """Outputs on joints at their actuatorfrcrange, where the force does not yield."""
+def _cut_off(s: Scratch, onto: Array) -> Integers:
+    """Dofs of joints at their actuatorfrcrange, where forces do not yield."""
     mj = s.mj
     limited = mj.jnt_actfrclimited[mj.dof_jntid].astype(bool)
     least, most = mj.jnt_actfrcrange[mj.dof_jntid].T
-    cut = limited & ((onto <= least) | (onto >= most))
-    return np.unique(moment[:, np.flatnonzero(cut)].nonzero()[0])
+    return np.flatnonzero(limited & ((onto <= least) | (onto >= most)))
 
 
 def _in_pattern(moment: csr_array, pattern: Pattern) -> Mask:
