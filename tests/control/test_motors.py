@@ -279,7 +279,7 @@ def test_an_actuator_and_a_motion_of_one_joint_are_refused(tmp_path: Path) -> No
 
 
 def test_trials_act_with_the_actuators_of_the_world(tmp_path: Path) -> None:
-    """Copies advance their own activations, and the effort of a held joint is the pull of its muscle."""
+    """Copies advance their own activations, and the effort to hold a joint is its muscle's pull."""
     more = """
 [[actuator]]
 name = "lift"
@@ -338,3 +338,71 @@ def test_hold_leaves_the_joints_that_actuators_drive(tmp_path: Path) -> None:
     (tmp_path / "arm.toml").write_text(text.format(rate=120, more=more))
     with Simulation(tmp_path / "arm.toml", workers=1) as simulation:
         assert simulation.setup.motions == ()
+
+
+POLICY = """
+import flowborne as fb
+
+def pull(simulation, most):
+    bent = simulation.sensor("bent")[0]
+    return {"flexor": fb.Control(most * (bent < 0.5)), "lift": fb.Control(0.0)}
+"""
+
+
+def test_a_policy_tells_actuators_by_what_sensors_read(tmp_path: Path) -> None:
+    (tmp_path / "puller.py").write_text(POLICY)
+    more = """
+[policy]
+function = "puller:pull"
+actuators = ["flexor", "lift"]
+parameters = { most = 0.8 }
+"""
+    sensors = '<jointpos name="bent" joint="elbow"/>'
+    with arm(tmp_path, MUSCLES, sensors=sensors):
+        text = (tmp_path / "arm.toml").read_text()
+        (tmp_path / "arm.toml").write_text('plugins = ["puller.py"]\n' + text + more)
+    with Simulation(tmp_path / "arm.toml", workers=1) as simulation:
+        controls = []
+        for _ in range(60):
+            simulation.advance_frame()
+            controls.append(simulation.measure()["actuator_flexor_control"])
+        assert set(controls) == {0.0, 0.8}
+        assert simulation.joint("elbow").position[0] > 0.4
+
+
+def test_a_policy_that_tells_nothing_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "puller.py").write_text(POLICY)
+    with pytest.raises(fb.SceneError, match="tells nothing"):
+        arm(tmp_path, MUSCLES, more='[policy]\nfunction = "puller:pull"\n')
+
+
+def test_a_keyframe_of_the_model_gives_activations(tmp_path: Path) -> None:
+    key = '<keyframe><key name="tense" qpos="0.1 0.2" act="0.6 0.3"/></keyframe></mujoco>'
+    with arm(tmp_path, MUSCLES):
+        (tmp_path / "arm.xml").write_text(
+            ARM.format(actuators=MUSCLES, sensors="").replace("</mujoco>", key)
+        )
+        text = (tmp_path / "arm.toml").read_text()
+        (tmp_path / "arm.toml").write_text(
+            text.replace("[initial]", '[initial]\nkeyframe = "tense"')
+        )
+    with Simulation(tmp_path / "arm.toml", workers=1) as simulation:
+        np.testing.assert_array_equal(simulation.world.solid.act, [0.6, 0.3])
+
+
+def test_a_force_sensor_reads_what_hangs_on_a_joint(tmp_path: Path) -> None:
+    """A pendulum of 2 kg, on which a wind pulls by 5 N: what else its acceleration takes."""
+    (tmp_path / "arm.xml").write_text(
+        '<mujoco><worldbody><body name="bob"><joint name="hinge" axis="0 1 0" stiffness="1e6"/>'
+        '<geom type="sphere" size=".1" pos="0 0 -.5" mass="2"/><site name="top"/></body>'
+        '</worldbody><sensor><force name="pull" site="top"/></sensor></mujoco>'
+    )
+    (tmp_path / "arm.toml").write_text(
+        'gravity = [0.0, 0.0, -9.81]\n[time]\nframes = 4\n[solids]\nmodel = "arm.xml"\n'
+        '[[wind]]\nkind = "force"\nforce = [5.0, 0.0, 0.0]\n'
+    )
+    with Simulation(tmp_path / "arm.toml", workers=1) as simulation:
+        for _ in range(4):
+            simulation.advance_frame()
+        wanted = 2.0 * simulation.body("bob").acceleration - [5.0, 0.0, -2.0 * 9.81]
+        assert simulation.sensor("pull") == pytest.approx(wanted, abs=5e-3)
