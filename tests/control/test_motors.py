@@ -406,3 +406,33 @@ def test_a_force_sensor_reads_what_hangs_on_a_joint(tmp_path: Path) -> None:
             simulation.advance_frame()
         wanted = 2.0 * simulation.body("bob").acceleration - [5.0, 0.0, -2.0 * 9.81]
         assert simulation.sensor("pull") == pytest.approx(wanted, abs=5e-3)
+
+
+@pytest.mark.parametrize("gear", [1.0, 2.0])
+def test_the_rotor_of_a_motor_turns_with_its_joint(tmp_path: Path, gear: float) -> None:
+    """An armature of 0.1 kg m^2 behind a gear, also where a hinge carries the whole body."""
+    (tmp_path / "arm.xml").write_text(
+        '<mujoco><worldbody><body name="rotor"><joint name="hinge" axis="0 0 1"/>'
+        '<geom type="sphere" size=".1" mass="2"/></body></worldbody><actuator>'
+        f'<motor name="turn" joint="hinge" gear="{gear}" armature="0.1"/></actuator></mujoco>'
+    )
+    (tmp_path / "arm.toml").write_text('[time]\nframes = 4\n[solids]\nmodel = "arm.xml"\n')
+    inertia = 0.4 * 2.0 * 0.1**2 + 0.1 * gear**2
+    with Simulation(tmp_path / "arm.toml", workers=1) as simulation:
+        report = simulation.advance_frame({"turn": Control(0.3)})
+        assert report.step.acceleration[0] == pytest.approx(0.3 * gear / inertia, rel=1e-9)
+
+
+def test_a_servo_of_a_joint_has_the_columns_of_its_actuator(tmp_path: Path) -> None:
+    """The force times the gear is the torque of the drive, within the actuator's largest force."""
+    servo = '<position name="flexor" joint="elbow" kp="2" gear="2" forcerange="-.1 .1"/>'
+    more = '[[actuator]]\nname = "flexor"\nvalue = 1.0\n'
+    with arm(tmp_path, servo, more=more) as simulation:
+        for _ in range(4):
+            simulation.advance_frame()
+            row = simulation.measure()
+            torque = 2.0 * row["actuator_flexor_force"]
+            assert row["torque_elbow_Nm"] == pytest.approx(torque, rel=1e-12)
+            assert row["power_elbow_W"] == pytest.approx(row["actuator_flexor_power_W"], rel=1e-12)
+            assert 0.0 < row["actuator_flexor_force"] <= 0.1 * (1.0 + 1e-9)
+            assert row["actuator_flexor_control"] == 1.0

@@ -78,7 +78,7 @@ class SolidModel:
     dof_root       (nv,) ancestor of that body that is a child of the world
     moves          (nbody, nv) whether a dof moves a body
     conserved      (nv,) dofs along which only external forces change the momentum of the bodies
-    armature       (nv,) inertia of the joints, kg m^2 or kg
+    armature       (nv,) inertia of the joints and of actuators on them, kg m^2 or kg
     body_mass      (nbody + nodes,) kg; nodes of flesh come after the bodies
     subtree_mass   (nbody + nodes,) kg, of the body and all below
     volume         (nbody,) displaced volume, m^3 (area in a slab); overlaps of geometries of a
@@ -300,7 +300,7 @@ class SolidModel:
         self.moves: Mask = np.zeros((self.nbody, self.nv), bool)
         for body in range(1, self.nbody):
             self.moves[body] = self.moves[mj.body_parentid[body]] | (self.dof_body == body)
-        self.armature: Array = np.array(mj.dof_armature)
+        self.armature: Array = _armature(mj)
         self.conserved = _conserved(mj)
         self.locked: Mask = np.zeros(self.nv, bool)
         if self.slab:
@@ -387,6 +387,17 @@ def _number(numbers: Mapping[str, int], name: str, what: str) -> int:
     if name not in numbers:
         raise ValueError(f"no {what} '{name}' in the model. It has: {', '.join(numbers)}.")
     return numbers[name]
+
+
+def _armature(mj: mujoco.MjModel) -> Array:
+    """(nv,) inertia that turns with a joint and is not that of a body."""
+    armature = np.array(mj.dof_armature)
+    for actuator in np.flatnonzero(mj.actuator_armature):
+        joint = int(mj.actuator_trnid[actuator, 0])
+        if mj.actuator_trntype[actuator] == mujoco.mjtTrn.mjTRN_JOINT:
+            gear = float(mj.actuator_gear[actuator, 0])
+            armature[mj.jnt_dofadr[joint]] += gear**2 * mj.actuator_armature[actuator]
+    return armature
 
 
 def _conserved(mj: mujoco.MjModel) -> Mask:
