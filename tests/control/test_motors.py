@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import flowborne as fb
-from flowborne.control.commands import Control
+from flowborne.control.commands import Control, Torque
 from flowborne.runs.checkpoint import load_checkpoint, save_checkpoint
 from flowborne.sim.running import run
 from flowborne.sim.simulation import Simulation
@@ -421,6 +421,28 @@ def test_the_rotor_of_a_motor_turns_with_its_joint(tmp_path: Path, gear: float) 
     with Simulation(tmp_path / "arm.toml", workers=1) as simulation:
         report = simulation.advance_frame({"turn": Control(0.3)})
         assert report.step.acceleration[0] == pytest.approx(0.3 * gear / inertia, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    "inertia",
+    ['tendon="string" armature="0.2"', 'tendon="string" gear="2" armature="0.05"'],
+    ids=["gear 1", "gear 2"],
+)
+def test_a_tendon_has_the_inertia_of_its_motor(tmp_path: Path, inertia: str) -> None:
+    """MuJoCo's mass matrix counts, also on a hinge that carries the whole body."""
+    model = (
+        '<mujoco><worldbody><site name="wall" pos=".3 0 0"/><body name="b"><joint name="hinge" '
+        'axis="0 0 1"/><geom type="sphere" size=".1" mass="2"/><site name="rim" pos=".1 .1 0"/>'
+        '</body></worldbody><tendon><spatial name="string"><site site="wall"/><site site="rim"/>'
+        f'</spatial></tendon><actuator><motor name="turn" {inertia}/></actuator></mujoco>'
+    )
+    (tmp_path / "arm.xml").write_text(model)
+    (tmp_path / "arm.toml").write_text('[time]\nframes = 4\n[solids]\nmodel = "arm.xml"\n')
+    with Simulation(tmp_path / "arm.toml", workers=1) as simulation:
+        whole = fb.bodies.mass_matrix(simulation.setup.solid, simulation.world.solid.q)[0, 0]
+        report = simulation.advance_frame({"hinge": Torque(0.1)})
+        assert whole > 1.2 * 0.4 * 2.0 * 0.1**2
+        assert report.step.acceleration[0] == pytest.approx(0.1 / whole, rel=1e-6)
 
 
 def test_a_servo_of_a_joint_has_the_columns_of_its_actuator(tmp_path: Path) -> None:
