@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from flowborne.sim.running import RunInterrupted, RunResult, run
     from flowborne.sim.simulation import BlowUpError, Simulation
     from flowborne.solids.model import SolidModel, SolidState
-    from flowborne.solids.sensed import BodyState, JointState
+    from flowborne.solids.sensed import ActuatorState, BodyState, JointState
     from flowborne.solids.tissue.growth import Tissue
     from flowborne.studies.batch_page import Batch, ClipRun
     from flowborne.studies.batches import run_clips
@@ -51,6 +51,7 @@ if TYPE_CHECKING:
     from flowborne.worlds import advance, make_world
 
 __all__ = [
+    "ActuatorState",
     "Array",
     "Batch",
     "BlowUpError",
@@ -116,6 +117,7 @@ PAGES = ("parts", "bodies", "play.gym", "machine", "pictures", "worlds")
 """Public modules of the package, besides itself."""
 
 _PLACES = {
+    "ActuatorState": "flowborne.solids.sensed",
     "Array": "flowborne.kernels.arrays",
     "Batch": "flowborne.studies.batch_page",
     "BlowUpError": "flowborne.sim.simulation",

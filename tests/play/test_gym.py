@@ -115,3 +115,72 @@ def test_it_draws_what_the_film_shows(small_scene: Path) -> None:
 def test_what_cannot_be_is_said(small_scene: Path, how: dict[str, object], said: str) -> None:
     with pytest.raises(fb.SceneError, match=said):
         SceneEnv(small_scene, **how)  # type: ignore[arg-type]
+
+
+THRUSTERS = """<mujoco><worldbody><body name="hull"><freejoint name="free"/>
+  <geom name="hull" type="sphere" size="0.1" mass="4"/><site name="left" pos="0 .05 0"/>
+  <site name="right" pos="0 -.05 0"/>
+  <body name="fin" pos="-.1 0 0"><joint name="fin" axis="0 0 1" range="-60 60"/>
+    <geom type="box" size=".04 .01 .04" pos="-.05 0 0" density="1000"/></body></body></worldbody>
+<actuator><motor name="port" site="left" gear="1 0 0 0 0 0" ctrlrange="-50 60"/>
+  <motor name="starboard" site="right" gear="1 0 0 0 0 0" ctrlrange="-50 60"/>
+  <position name="rudder" joint="fin" kp="5" ctrlrange="-.5 .5"/></actuator>
+<sensor><gyro name="gyro" site="left"/><framepos name="at" objtype="body" objname="hull"/></sensor>
+</mujoco>"""
+
+
+def along_x(simulation: fb.Simulation, report: fb.FrameReport) -> float:
+    return float(simulation.body("hull").velocity[0])
+
+
+def vehicle(folder: Path) -> Path:
+    (folder / "hull.xml").write_text(THRUSTERS)
+    (folder / "hull.toml").write_text(
+        '[time]\nframes_per_second = 50\nframes = 4\n[solids]\nmodel = "hull.xml"\n'
+    )
+    return folder / "hull.toml"
+
+
+def test_a_policy_tells_the_actuators_of_the_model(tmp_path: Path) -> None:
+    """Two thrusters of 20 N on 4.1 kg, and a rudder by its servo; sensors are observed."""
+    env = SceneEnv(vehicle(tmp_path), reward=along_x)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        warnings.filterwarnings("ignore", ".*observation space (m|is a Box).*")
+        warnings.filterwarnings("ignore", ".*infinity.*")
+        check_env(env, skip_render_check=True)
+    env.reset()
+    thrust = (20.0 + 50.0) / 110.0 * 2.0 - 1.0
+    env.step(np.array([thrust, thrust, 1.0], np.float32))
+    observed, reward, *_ = env.step(np.array([thrust, thrust, 1.0], np.float32))
+    named = dict(zip(env.observed, observed, strict=True))
+    assert named["force_port"] == named["force_starboard"] == pytest.approx(20.0, rel=1e-6)
+    assert named["position_fin_rad"] > 0.0
+    assert named["sensor_at_x_m"] > 0.0
+    assert "sensor_gyro_z_rad/s" in named
+    mass = env.simulation.setup.solid.body_mass.sum()
+    acceleration = env.simulation.body("hull").acceleration[0]
+    assert acceleration == pytest.approx(40.0 / mass, rel=0.05)
+    assert reward > 0.0
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"actuators": ("prot",)}, "no actuator 'prot' in the model; did you mean 'port'"),
+        ({"actuators": ("port",), "reward": None}, r"has no \[\[objectives\]\].*Give one"),
+        ({"joints": ("fin",)}, "'fin' is not among the controlled ones"),
+    ],
+)
+def test_actuators_that_cannot_be_told_are_refused(
+    tmp_path: Path, given: dict[str, object], said: str
+) -> None:
+    with pytest.raises(fb.SceneError, match=said):
+        SceneEnv(vehicle(tmp_path), **{"reward": along_x, **given})  # type: ignore[arg-type]
+
+
+def test_an_actuator_without_a_range_is_no_action(tmp_path: Path) -> None:
+    path = vehicle(tmp_path)
+    (tmp_path / "hull.xml").write_text(THRUSTERS.replace(' ctrlrange="-.5 .5"', ""))
+    with pytest.raises(fb.SceneError, match="'rudder' has no limit for actions"):
+        SceneEnv(path, reward=along_x)

@@ -134,8 +134,8 @@ def test_what_of_the_file_has_no_effect_is_said_once(written: Written) -> None:
     assert said == (
         "[solids]: of robot.xml these have no effect: its timestep of 4 ms, where a step is 10 ms; "
         "options cone elliptic, density, gravity disabled; keyframes bent, of which [initial] "
-        "keyframe takes one; 2 actuators, which a script or a policy drives, and of which [solids] "
-        "hold = true takes 1; 1 sensor"
+        "keyframe takes one; actuators actuator0, actuator1, which nothing tells: [[actuator]], "
+        "[policy] or a script tells them, and [solids] hold = true takes actuator0"
     )
     own = {'<geom_class="bone"_size=".1"/>': '<inertial mass="1" pos="0 0 0" diaginertia="1 1 1"/>'}
     scene = load_scene(written("density = 500.0\n", **own))

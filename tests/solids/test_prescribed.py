@@ -13,6 +13,7 @@ from flowborne.solids.driven import drive, within_limits
 from flowborne.solids.dynamics import assemble, kinematics
 from flowborne.solids.model import SolidModel, SolidState
 from flowborne.solids.prescribed import PrescribedSystem, prescribe
+from flowborne.solids.trajectories import JointCommand
 
 from .held_pose import holding
 
@@ -232,14 +233,15 @@ def test_holding_against_centrifugal_force() -> None:
 def test_bodies_under_another_force_are_those_made_anew(seed: int, which: list[bool]) -> None:
     """To the bit, with dampers and Coriolis forces; not on the floor, whose rows differ."""
     model, dt, rng = CREATURE, 0.01, np.random.default_rng(seed)
-    rest, given, limit = model.rest(), np.array(which), np.full(model.nv, np.inf)
+    rest, given, command = model.rest(), np.array(which), JointCommand.none(model.nv)
     low, hold = 0.1 * rng.normal(size=model.nv), rng.normal(size=model.nv)
+    command.set(given, hold[given], hold[given])
     high = low + np.array([0.0, 0.0, 5.0, *np.zeros(model.nv - 3)])
     forces, v = rng.normal(size=(2, model.nv)), rng.normal(size=model.nv)
     for shift, free in ((low, False), (high, True)):
         before = SolidState(model.integrate(rest.q, shift, 1.0), v)
         state = SolidState(model.integrate(before.q, v, dt), v)
-        driven = [drive(model, state, f, dt, before, given, hold, limit) for f in forces]
+        driven = [drive(model, state, f, dt, before, command) for f in forces]
         driven[0].updated(driven[0].velocity + 0.1)
         again = driven[0].under(forces[1])
         assert (again is None) == (not free and driven[0].system.rows is not None)

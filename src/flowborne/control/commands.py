@@ -10,11 +10,13 @@ from typing import Any
 import numpy as np
 
 from flowborne.base.errors import SceneError
+from flowborne.base.phrases import suggestion
 from flowborne.control.creature import within_range
 from flowborne.coupling.world import Setup, World
 from flowborne.kernels.arrays import Array, Integers
-from flowborne.solids.actuators import actuators
+from flowborne.solids.actuators import ActuatorServo, actuator_servos, unusable_actuator
 from flowborne.solids.model import FREE, SolidModel
+from flowborne.solids.motors import Controls, control_range, driven_by, inputs_of
 from flowborne.solids.trajectories import (
     Servo,
     ServoExact,
@@ -70,11 +72,15 @@ class Control:
     """What an actuator of the model is told, by its own name: u as MuJoCo's `ctrl`, held within its
     range.
 
-    A motor is a torque. A position actuator is a critically damped servo of its stiffness, and a
-    velocity actuator an exact one, each with the actuator's largest force.
+    On a hinge or slide a position actuator is a critically damped servo of its stiffness, and a
+    velocity actuator an exact one, each with the actuator's largest force. All others, such as
+    motors, muscles, and those on sites and tendons, exert MuJoCo's force. An actuator acts in
+    frames in which it has a control.
+
+    value  several numbers for an actuator with several controls
     """
 
-    value: float
+    value: Numbers
 
 
 Command = Position | Velocity | Torque | Control
@@ -99,8 +105,21 @@ def told_by(
     """
     model, motions, beyond = world.setup.solid, list[Trajectory](), list[str]()
     pushed, force = [np.zeros(0, np.int64)], [np.zeros(0)]
+    controls, servos = Controls.none(model), list[tuple[int, int]]()
+    as_servo = _sole_servos(model, commands)
     for name, given in commands.items():
-        joint, command, own = _actuated(model, name, given)
+        joint, command, own = name, given, None
+        if isinstance(given, Control):
+            number, values, said = _controlled(model, name, given)
+            beyond += said
+            controls.values[inputs_of(model, number)] = values
+            if name not in as_servo:
+                controls.told[number] = True
+                pushed.append(freed := driven_by(model, number))
+                force.append(np.zeros(freed.size))
+                continue
+            joint, command, own = _as_servo(as_servo[name], float(values[0]))
+            servos.append((number, int(model.dofs_of(joint)[0])))
         dofs = _driven_dofs(model, joint)
         servo = servo_of(dofs, drives) if own is None else own
         if isinstance(command, Torque):
@@ -121,22 +140,40 @@ def told_by(
                 f"the command to '{joint}' is {command!r:.60}: "
                 "give a Position, a Velocity, a Torque or a Control"
             )
-    return Told(tuple(motions), np.concatenate(pushed), np.concatenate(force)), tuple(beyond)
+    pushes = np.concatenate(pushed), np.concatenate(force)
+    acting = controls if controls.told.any() or servos else None
+    return Told(tuple(motions), *pushes, acting, servos), tuple(beyond)
 
 
-def _actuated(model: SolidModel, name: str, command: Command) -> tuple[str, Command, Servo | None]:
-    """Joint, command and servo that an actuator's control means; other commands as they are."""
-    if not isinstance(command, Control):
-        return name, command, None
-    known = {actuator.name: actuator for actuator in actuators(model)}
-    if name not in known:
-        names = ", ".join(known) or "none on hinges or slides"
-        raise SceneError(f"'{name}' is no actuator that can be told. The model has: {names}")
-    actuator = known[name]
-    wanted = actuator.wanted(float(_numbers(name, command.value, 1)[0]))
-    limit = actuator.limit or math.inf
-    if actuator.kind == "motor":
-        return actuator.joint, Torque(wanted), ServoExact(limit)
+def _controlled(model: SolidModel, name: str, command: Control) -> tuple[int, Array, list[str]]:
+    """Number of an actuator, its controls (k,) within their range, and what was beyond it."""
+    if name not in model.actuator_names:
+        end = suggestion(name, model.actuator_names, "Its actuators are")
+        raise SceneError(f"the model has no actuator '{name}'{end}")
+    number = model.actuator(name)
+    if wrong := unusable_actuator(model, number):
+        raise SceneError(wrong)
+    low, high = control_range(model, number)
+    wanted = _numbers(name, command.value, low.size)
+    values = np.clip(wanted, low, high)
+    return number, values, _said(name, wanted, values, "of control")
+
+
+def _sole_servos(model: SolidModel, commands: Commands) -> dict[str, ActuatorServo]:
+    """Actuators that drive their joint as its servo: those that have it to themselves."""
+    told = [name for name, given in commands.items() if isinstance(given, Control)]
+    numbers = [model.actuator(name) for name in told if name in model.actuator_names]
+    dofs = [int(dof) for number in numbers for dof in driven_by(model, number)]
+    return {
+        model.actuator_names[servo.number]: servo
+        for servo in actuator_servos(model)
+        if servo.number in numbers and dofs.count(int(model.dofs_of(servo.joint)[0])) == 1
+    }
+
+
+def _as_servo(actuator: ActuatorServo, u: float) -> tuple[str, Command, Servo]:
+    """Joint, command and servo that the control of a position or velocity actuator means."""
+    wanted, limit = actuator.wanted(u), actuator.limit or math.inf
     if actuator.kind == "velocity":
         return actuator.joint, Velocity(wanted), ServoExact(limit)
     return actuator.joint, Position(wanted), ServoPD(actuator.frequency, limit)

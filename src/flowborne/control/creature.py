@@ -6,6 +6,7 @@ joints (a rotation about axes of the joint's own frame) as for hinges and slides
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -50,8 +51,7 @@ def give_velocity(world: World, dofs: Integers, velocity: Array, kept: Integers)
     wanted = np.zeros(model.nv)
     wanted[dofs] = velocity
     excess = SolidState(state.q.copy(), state.v - wanted)
-    world.solid = rigidify(model, excess, dofs, fixed)
-    world.solid.v += wanted
+    world.solid = replace(state, v=rigidify(model, excess, dofs, fixed).v + wanted)
 
 
 def moved(model: SolidModel, q: Array, displacement: Array) -> Array:

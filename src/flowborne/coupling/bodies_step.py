@@ -24,6 +24,7 @@ from flowborne.solids.driven import Driven, drive
 from flowborne.solids.dynamics import kinematics
 from flowborne.solids.following import follow
 from flowborne.solids.model import SolidState
+from flowborne.solids.motors import Controls, advanced, motors
 from flowborne.solids.prescribed import PrescribedSystem
 from flowborne.solids.scratch import cross
 from flowborne.solids.trajectories import JointCommand
@@ -56,14 +57,27 @@ def equations(
     of the last step where only that force is another."""
     goal, limit, model = command.final_velocity, command.torque_limit, world.setup.solid
     driven, q, v = command.prescribed, world.solid.q, world.solid.v
-    force = force + world.told.force_on(model.nv)
+    force, added, controls = force + world.told.force_on(model.nv), None, world.told.controls
+    world.motors = None if controls is None else motors(model, world.solid, controls, dt)
+    if world.motors is not None:
+        force, added = force + world.motors.onto, world.motors.matrix
     arrays = q, v, before.q, before.v, driven, goal, limit
     given, found = (model, dt, *(a.tobytes() for a in arrays)), None
-    if world.driven is not None and world.driven[0] == given:
+    if added is None and world.driven is not None and world.driven[0] == given:
         found = world.driven[1].under(force)
-    made = found or drive(model, world.solid, force, dt, before, driven, goal, limit)
-    world.driven = (given, made) if isinstance(made, PrescribedSystem) else None
+    made = found or drive(model, world.solid, force, dt, before, command, added)
+    world.driven = None
+    if added is None and isinstance(made, PrescribedSystem):
+        world.driven = given, made
     return made
+
+
+def activate(world: World, dt: float) -> None:
+    """Advance the activations of the actuators by dt (s), in place."""
+    model, controls = world.setup.solid, world.told.controls
+    if world.solid.act.size:
+        controls = controls or Controls.none(model)
+        world.solid.act = advanced(model, world.solid, controls, dt)
 
 
 @timed("solids")
@@ -94,6 +108,7 @@ def advance_prescribed(world: World, dt: float, command: JointCommand) -> bool:
     command = joint_command(world, dt, command)
     if not np.all(command.prescribed & np.isinf(command.torque_limit)):
         return False
+    activate(world, dt)
     move_bodies(world, command, dt)
     world.solid.v[:] = command.final_velocity
     world.advance_clock(dt)

@@ -117,7 +117,8 @@ class StepReport:
     velocity         (nv,) at the end of the step: v is that half a step before, then half a step
                      after it, and this is the mean of both
     acceleration     (nv,) change of v in the step by dt
-    actuator         (nv,) generalised force of the drives (and of locked dofs), N or N m
+    actuator         (nv,) generalised force of the drives (and of locked dofs), N or N m; where
+                     there is none, that of the model's actuators
     pressure_wrench  (nbody, 6) force and torque about the world origin of the dynamic pressure
     viscous_wrench   (nbody, 6) the same of the shear stress
     buoyancy_wrench  (nbody, 6) the same of the hydrostatic pressure (Archimedes)
@@ -126,7 +127,7 @@ class StepReport:
     added_mass       of which `added_mass_wrench` is made
     centre           (nbody, 3) centres of mass at the end of the step, m; 0 where neither a fluid
                      nor a wind acts
-    work             of the drives, J
+    work             of the drives and of the model's actuators, J
     momentum_solid   of the bodies half a step on, which keeps what it is given exactly
                      (see solids.momentum.halfway_momentum)
     momentum_fluid   of the fluid (density x control volume of each face)
@@ -159,6 +160,8 @@ class StepReport:
     contacts         number of active contacts
     fastest          largest speed of the fluid across an open face after the solve, m/s
     seconds          where the time went: advection, viscosity, projection, geometry, solids
+    output           (n,) force of each output of the model's actuators, N or N m
+    output_power     (n,) force times the rate of the actuator's length, W
     limited          (k,) dofs whose torque limit was reached
     unsettled        (k,) dofs whose contacts, joint limits or drives still changed when the step
                      gave up; none when Coriolis forces alone did
@@ -197,6 +200,8 @@ class StepReport:
     contacts: Annotated[int, Joined(last, max)] = 0
     fastest: Annotated[float, Joined(max, max, "m/s")] = 0.0
     seconds: Annotated[dict[str, float], Joined(last)] = field(default_factory=dict)
+    output: Mean = field(default_factory=partial(np.zeros, 0))
+    output_power: Mean = field(default_factory=partial(np.zeros, 0))
     limited: Annotated[Integers, Joined(union)] = field(default_factory=no_dofs)
     unsettled: Annotated[Integers, Joined(last)] = field(default_factory=no_dofs)
 
@@ -224,7 +229,7 @@ class StepReport:
         """What can be sensed of the bodies and joints of `world` after the step."""
         state = self.velocity, self.acceleration, self.dt, self.actuator
         wrenches = self.central_wrench(), self.central_added_mass
-        return Sensed(world.setup.solid, world.solid.q, *state, *wrenches)
+        return Sensed(world.setup.solid, world.solid.q, *state, *wrenches, self.output)
 
 
 def about(wrench: Array, points: Array) -> Array:

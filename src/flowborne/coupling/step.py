@@ -33,6 +33,7 @@ from dataclasses import replace
 import numpy as np
 
 from flowborne.coupling.bodies_step import (
+    activate,
     equations,
     move_bodies,
     part_of,
@@ -81,6 +82,7 @@ def step(world: World, dt: float, command: JointCommand | None = None) -> StepRe
         reports: list[StepReport] = []
         world.splitting = ()
         for left in range(parts, 0, -1):
+            activate(world, dt / parts)
             reports.append(step_part(world, dt / parts, part_of(command, world, left)))
             if reports[-1].outcome is not Outcome.DONE:
                 break

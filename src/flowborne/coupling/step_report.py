@@ -43,7 +43,9 @@ def fluid_forces(model: SolidModel, value: float) -> dict[str, Any]:
 def report_failed(model: SolidModel, dt: float, outcome: Outcome) -> StepReport:
     """Of a step that ended before its solve."""
     drives = np.full(model.nv, np.nan)
-    return StepReport(dt, outcome, drives, drives, drives, **fluid_forces(model, np.nan))
+    forces = fluid_forces(model, np.nan)
+    none = np.full(model.outputs, np.nan)
+    return StepReport(dt, outcome, drives, drives, drives, **forces, output=none, output_power=none)
 
 
 def report_bodies(world: World, dt: float, solved: Solved, known: dict[str, Any]) -> StepReport:
@@ -54,6 +56,15 @@ def report_bodies(world: World, dt: float, solved: Solved, known: dict[str, Any]
     before, model = solved.driven.system.v, world.setup.solid
     velocity = 0.5 * (before + solved.v)
     actuator = solved.actuator + world.told.force_on(model.nv)
+    work, (outputs, rates) = dt * float(actuator @ velocity), np.zeros((2, model.outputs))
+    if world.motors is not None:
+        outputs, onto = world.motors.through(solved.v - before)
+        rates, work = world.motors.moment @ velocity, work + dt * float(onto @ velocity)
+        own = solved.driven.prescribed | solved.driven.limited
+        actuator = np.where(own, actuator, actuator + onto)
+    for number, dof in world.told.servos:
+        place, gear = model.mj.actuator_outadr[number], model.mj.actuator_gear[number, 0]
+        outputs[place], rates[place] = actuator[dof] / gear, gear * velocity[dof]
     balance = UNKNOWN
     if world.setup.balances:
         balance = {"momentum_solid": halfway_momentum(model, world.solid, dt)[0]}
@@ -63,10 +74,12 @@ def report_bodies(world: World, dt: float, solved: Solved, known: dict[str, Any]
         velocity,
         (solved.v - before) / dt,
         actuator,
-        work=dt * float(actuator @ velocity),
+        work=work,
         contacts=solved.driven.system.contacts,
         limited=solved.driven.limited.nonzero()[0],
         unsettled=solved.unsettled,
+        output=outputs,
+        output_power=outputs * rates,
         **balance | known,
     )
 

@@ -23,6 +23,7 @@ from flowborne.fluid.window import Window, crosses
 from flowborne.kernels.arrays import Array
 from flowborne.solids.dynamics import Kinematics
 from flowborne.solids.model import SolidModel, SolidState
+from flowborne.solids.motors import Motors
 from flowborne.solids.prescribed import PrescribedSystem
 from flowborne.solids.trajectories import NOTHING_TOLD, Told, Trajectory
 from flowborne.solids.wind import Wind
@@ -152,6 +153,7 @@ class World:
     pressed the control volumes that the last step ended with, the gradient of the pressure on them,
             and its matrix; likewise
     driven  what the equations of the bodies in the last step were made from, and these; likewise
+    motors  what the actuators do in the step, None where none acts; likewise
     splitting
             make the added-mass part of forces, for each part of the last step; likewise
     """
@@ -176,10 +178,11 @@ class World:
     driven: tuple[tuple[object, ...], PrescribedSystem] | None = field(
         default=None, repr=False, compare=False
     )
+    motors: Motors | None = field(default=None, repr=False, compare=False)
     splitting: tuple[Callable[[], Array], ...] = field(default=(), repr=False, compare=False)
 
     def __getstate__(self) -> dict[str, object]:
-        kept = dict.fromkeys(("cut", "volumes", "still", "pressed", "driven"))
+        kept = dict.fromkeys(("cut", "volumes", "still", "pressed", "driven", "motors"))
         return vars(self) | kept | {"splitting": ()}
 
     @classmethod
@@ -215,6 +218,8 @@ class World:
         clock = [self.time, self.steps, self.ahead, self.parts]
         named: dict[str, Array] = {"clock": np.array(clock)}
         named |= {"solid/q": self.solid.q, "solid/v": self.solid.v}
+        if self.solid.act.size:
+            named["solid/act"] = self.solid.act
         if self.fluid is not None:
             named |= {f"fluid/{k}": v for k, v in self.fluid.arrays().items()}
             named["grid/origin"] = np.array(self.flow()[0].grid.origin)
@@ -229,7 +234,7 @@ class World:
             setup = setup.on(replace(setup.fluid.grid, origin=(x, y, z)))
         return cls(
             setup,
-            SolidState(arrays["solid/q"], arrays["solid/v"]),
+            SolidState(arrays["solid/q"], arrays["solid/v"], arrays.get("solid/act", np.zeros(0))),
             None if setup.fluid is None else FluidState.from_arrays(under("fluid/", arrays)),
             float(time),
             int(steps),

@@ -21,14 +21,27 @@ import numpy as np
 
 from flowborne.base.errors import SceneError
 from flowborne.base.extras import optional
-from flowborne.control.commands import Command, Position, Torque, Velocity, servo_of, torque_limit
+from flowborne.base.phrases import suggestion
+from flowborne.control.commands import (
+    Command,
+    Control,
+    Position,
+    Torque,
+    Velocity,
+    servo_of,
+    torque_limit,
+)
 from flowborne.control.measurement import Measurement
 from flowborne.kernels.arrays import Array
+from flowborne.scenes.actuators import joints_of_actuators
 from flowborne.scenes.load import load_scene
 from flowborne.scenes.schema import Scene
+from flowborne.sim.columns import sensor_values
 from flowborne.sim.frame import FrameReport
 from flowborne.sim.simulation import BlowUpError, Simulation
 from flowborne.solids.model import SLIDE
+from flowborne.solids.motors import control_range
+from flowborne.solids.sensors import sensor_columns
 
 __all__ = ["ENVIRONMENTS", "SceneEnv"]
 
@@ -50,17 +63,21 @@ Reward = Callable[[Simulation, FrameReport], float]
 
 
 class SceneEnv(gymnasium.Env):  # type: ignore[name-defined]
-    """A scene whose controlled joints, or some of them, are told by a policy.
+    """A scene whose controlled joints and actuators, or some of them, are told by a policy.
 
     An action has a number from -1 to 1 for each dof of these joints: part of its strength in the
     scene ("velocity"), a place in its range ("position"), or part of its torque limit ("torque").
-    An observation has, for each of them, position (scalar joints), velocity and drive force, then
-    velocity and angular velocity of the body that carries the creature in its own axes; see
-    `observed`. It is zero before the first frame where only a step can tell.
+    After them it has one for each control of the actuators: a place in its range.
+    An observation has, for each of the joints and of those that the actuators drive, position
+    (scalar joints), velocity and drive force, then activations and forces of the actuators,
+    velocity and angular velocity of the body that carries the creature in its own axes, and the
+    model's sensors; see `observed`. It is zero before the first frame where only a step can tell.
 
     scene        a Scene, the name of a built-in one, or the path of a scene file
     joints       those that the policy tells; all controlled ones when None. The controller decides
                  for the others
+    actuators    those of the model that the policy tells, by Control; when None all of the model's
+                 in a scene that controls no joint and has no [[actuator]], else none
     kind         what an action means
     every        frames for which an action holds
     reward       of a frame; by default minus the scene's objectives, in the mean over the frames of
@@ -79,6 +96,7 @@ class SceneEnv(gymnasium.Env):  # type: ignore[name-defined]
         scene: Scene | str | Path,
         *,
         joints: tuple[str, ...] | None = None,
+        actuators: tuple[str, ...] | None = None,
         kind: Kind = "velocity",
         every: int = 1,
         reward: Reward | None = None,
@@ -87,9 +105,15 @@ class SceneEnv(gymnasium.Env):  # type: ignore[name-defined]
     ) -> None:
         self.scene = load_scene(scene) if isinstance(scene, str | Path) else scene
         self.simulation = Simulation(self.scene, workers=1)
+        self._actuators = self._told_actuators(joints, actuators)
         self._joints = self._told(joints)
         self._kind, self._every, self.render_mode = kind, every, render_mode
         self._objective, self._own_observe = reward or self._minus_objectives, observe
+        if reward is None and self.simulation.controller is None:
+            raise SceneError(
+                f"scene {self.scene.name} has no [[objectives]], so an environment of it has no "
+                "reward. Give one: reward = a function of the simulation and the frame's report."
+            )
         self._low, self._high = self._limits()
         self.observed = tuple(self._observed())
         self._start = self.simulation.snapshot()
@@ -136,20 +160,33 @@ class SceneEnv(gymnasium.Env):  # type: ignore[name-defined]
         controlled = self.scene.controlled_joints()
         found = controlled if joints is None else tuple(joints)
         others = [joint for joint in found if joint not in controlled]
-        if not found or others:
+        if others or not (found or self._actuators):
             which = f"joint '{others[0]}'" if others else "what a policy is to move"
             raise SceneError(
                 f"scene {self.scene.name}: {which} is not among the controlled ones. "
-                "Name in [[control]] the joints that a policy is to move."
+                "Name in [[control]] the joints that a policy is to move, or give actuators."
             )
         return found
+
+    def _told_actuators(
+        self, joints: tuple[str, ...] | None, named: tuple[str, ...] | None
+    ) -> tuple[str, ...]:
+        model = self.simulation.setup.solid
+        if named is None:
+            others = joints or self.scene.controlled_joints() or self.scene.actuator
+            return () if others else model.actuator_names
+        for name in named:
+            if name not in model.actuator_names:
+                end = suggestion(name, model.actuator_names, "Its actuators are")
+                raise SceneError(f"scene {self.scene.name}: no actuator '{name}' in the model{end}")
+        return tuple(named)
 
     def _limits(self) -> tuple[Array, Array]:
         """(n,) what -1 and 1 mean."""
         setup, controller = self.simulation.setup, self.simulation.controller
         model, ends = setup.solid, list[Array]()
-        assert controller is not None
         for joint in self._joints:
+            assert controller is not None
             dofs = model.dofs_of(joint)
             own = np.isin(controller.dofs, dofs)
             if self._kind == "velocity":
@@ -168,6 +205,13 @@ class SceneEnv(gymnasium.Env):  # type: ignore[name-defined]
                     f"'{self._kind}'. Give it a {key} in the model, or take another kind."
                 )
             ends.append(np.array([low, high]))
+        for name in self._actuators:
+            ends.append(np.array(control_range(model, model.actuator(name))))
+            if not np.isfinite(ends[-1]).all():
+                raise SceneError(
+                    f"scene {self.scene.name}: actuator '{name}' has no limit for actions. Give it "
+                    "a ctrlrange in the model, or name others in actuators."
+                )
         both = np.concatenate(ends, axis=1)
         return both[0], both[1]
 
@@ -180,13 +224,21 @@ class SceneEnv(gymnasium.Env):  # type: ignore[name-defined]
             count = self.simulation.setup.solid.dofs_of(joint).size
             commands[joint] = make(wanted[first : first + count])
             first += count
+        for name in self._actuators:
+            count = control_range(self.simulation.setup.solid, self._number(name))[0].size
+            commands[name] = Control(wanted[first : first + count])
+            first += count
         return commands
+
+    def _number(self, actuator: str) -> int:
+        return self.simulation.setup.solid.actuator(actuator)
 
     def _observed(self) -> dict[str, float]:
         """The numbers of an observation by their names."""
         simulation, model = self.simulation, self.simulation.setup.solid
         found: dict[str, float] = {}
-        for joint in self._joints:
+        driven = joints_of_actuators(model, self._actuators)
+        for joint in dict.fromkeys([*self._joints, *driven]):
             state, dofs = simulation.joint(joint), model.dofs_of(joint)
             if state.position.size == 1:
                 unit = "m" if model.mj.jnt_type[model.joint(joint)] == SLIDE else "rad"
@@ -194,11 +246,17 @@ class SceneEnv(gymnasium.Env):  # type: ignore[name-defined]
             for name in ("velocity", "drive"):
                 names = [f"{name}_{model.dof_names[dof]}" for dof in dofs]
                 found |= zip(names, getattr(state, name), strict=True)
+        for name in self._actuators:
+            acting = simulation.actuator(name)
+            for word, values in (("activation", acting.activation), ("force", acting.force)):
+                for place, value in enumerate(values):
+                    found[f"{word}_{name}" + f"_{place}" * (len(values) > 1)] = value
         root = simulation.body(model.body_names[int(model.moving.argmax())])
         velocity, turn = root.velocity @ root.rotation, root.angular_velocity @ root.rotation
         found |= {f"velocity_{axis}_m/s": v for axis, v in zip("xyz", velocity, strict=True)}
         found |= {f"turn_{axis}_rad/s": v for axis, v in zip("xyz", turn, strict=True)}
-        return found
+        columns = sensor_columns(model)
+        return found | dict(zip(columns, sensor_values(simulation.snapshot()), strict=True))
 
     def _observation(self) -> Array:
         if self._own_observe is not None:

@@ -30,6 +30,8 @@ UNITS = {
     "J": "J",
     "W": "W",
     "m3": "m^3",
+    "m/s2": "m/s^2",
+    "rad/s2": "rad/s^2",
 }
 """Suffix of a column name after its last underscore -> unit."""
 

@@ -13,6 +13,7 @@ from flowborne.base.errors import SceneError
 from flowborne.base.phrases import suggestion
 from flowborne.control.surroundings import Surroundings
 from flowborne.kernels.arrays import Array, Integers, Mask
+from flowborne.scenes.actuators import joints_of_actuators
 from flowborne.scenes.capture import clip_motion, human_of, pose_controlled
 from flowborne.scenes.draft import Draft
 from flowborne.scenes.earlier import earlier_joints, earlier_motion
@@ -20,7 +21,7 @@ from flowborne.scenes.flesh import grow
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.schema_bodies import named_holds
 from flowborne.solids import mjcf
-from flowborne.solids.actuators import actuators
+from flowborne.solids.actuators import actuator_servos
 from flowborne.solids.following import follow, posed_flesh
 from flowborne.solids.geoms import floors
 from flowborne.solids.loops import tied_joints
@@ -298,11 +299,12 @@ class TrajectoryHeld:
 
 
 def driven_dofs(scene: Scene, model: SolidModel, motions: Iterable[Trajectory]) -> Mask:
-    """(nv,) which dofs are moved by motions, the controller or the policy, or locked in a slab."""
+    """(nv,) which dofs motions, actuators, the controller or the policy move, or a slab locks."""
     moved = model.locked.copy()
     for motion in motions:
         moved[motion.dofs] = True
-    told = () if scene.policy is None else scene.policy.joints
+    told = joints_of_actuators(model, scene.told_actuators())
+    told += () if scene.policy is None else scene.policy.joints
     for joint in (*scene.controlled_joints(), *told):
         moved[model.dofs_of(joint)] = True
     return moved
@@ -365,7 +367,7 @@ def held(
         hold = tuple(undriven(scene, model, motions))
     servos: dict[str, Servo] = {
         a.joint: ServoPD(a.frequency, a.limit or math.inf)
-        for a in actuators(model)
+        for a in actuator_servos(model)
         if a.kind == "position"
     }
     for joint in hold:

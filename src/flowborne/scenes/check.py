@@ -9,6 +9,7 @@ import numpy as np
 from flowborne.control.surroundings import Surroundings
 from flowborne.coupling.world import Setup
 from flowborne.motion.clip import Clip
+from flowborne.scenes.actuators import check_actuators
 from flowborne.scenes.bodies import check_initial, initial_state, load_model, posed
 from flowborne.scenes.build import mouths_of, surroundings_of
 from flowborne.scenes.capture import capture_of, clip_motion
@@ -76,6 +77,7 @@ NEEDS_BODIES = (
     "shapes",
     "initial",
     "motion",
+    "actuator",
     "wind",
     "mouths",
     "control",
@@ -122,6 +124,7 @@ def check_bodies(draft: Draft, around: Surroundings) -> Iterator[str]:
     state = [
         *check_initial(draft, around),
         *check_motions(draft, draft.scene.motion, around),
+        *check_actuators(draft, scene.actuator, _moved(draft), around),
         *check_formulas(draft, _formulas(draft), scene.constants, scene.frame_times()),
     ]
     yield from state
@@ -213,9 +216,20 @@ def _formulas(draft: Draft) -> dict[str, str]:
     motions, mouths = enumerate(draft.scene.motion), enumerate(draft.scene.mouths)
     positions = [(n, m.position) for n, m in motions if isinstance(m, MotionFormulaTable)]
     factors = [(n, mouth.factor) for n, mouth in mouths if mouth.factor is not None]
-    return {draft.at("motion", n, "position"): text for n, text in positions} | {
-        draft.at("mouths", n, "factor"): text for n, text in factors
-    }
+    controls = [(n, table.formula) for n, table in enumerate(draft.scene.actuator)]
+    return (
+        {draft.at("motion", n, "position"): text for n, text in positions}
+        | {draft.at("mouths", n, "factor"): text for n, text in factors}
+        | {draft.at("actuator", n, "value"): text for n, text in controls if text is not None}
+    )
+
+
+def _moved(draft: Draft) -> dict[str, str]:
+    """Joints that something else than an actuator moves -> what does, in words."""
+    scene = draft.scene
+    hold = () if scene.solids is None or isinstance(scene.solids.hold, bool) else scene.solids.hold
+    earlier = dict.fromkeys(earlier_joints(scene), "moved by the [earlier] run")
+    return dict.fromkeys(hold, "in [solids] hold") | earlier | scene.moved_joints()
 
 
 def check_clip(draft: Draft) -> Iterator[str]:

@@ -1,7 +1,8 @@
 """Keyframes that a scene takes from a CSV file.
 
-The first row names the columns; one is `time` (s), the others are joint positions in degrees or m.
-A motion takes the column with its joint's name, or the one that `column` names. A scene that is
+The first row names the columns; one is `time` (s), the others are joint positions in degrees or m,
+or controls of actuators. A table takes the column with its joint's or actuator's name, or the one
+that `column` names. A scene that is
 written contains the numbers, and not the CSV file.
 """
 
@@ -9,6 +10,7 @@ from __future__ import annotations
 
 import csv
 import math
+from collections.abc import Iterator
 from contextlib import suppress
 from io import StringIO
 from pathlib import Path
@@ -21,19 +23,16 @@ from flowborne.scenes.draft import place
 
 
 def inline_keyframes(raw: dict[str, Any], folder: Path, file: str) -> list[str]:
-    """Replace `file` and `column` of every [[motion]] of `raw` by times and values.
+    """Replace `file` and `column` of each [[motion]] and [[actuator]] of `raw` by times and values.
 
-    A motion with an unreadable file gets a valid table, so that the rest can be checked.
+    A table with an unreadable file gets a valid table, so that the rest can be checked.
     returns  the problems
     """
     problems = []
-    motions = raw.get("motion")
-    for index, motion in enumerate(motions if isinstance(motions, list) else []):
-        keyframed = isinstance(motion, dict) and motion.get("kind") == "keyframes"
-        if not keyframed or "file" not in motion:
-            continue
-        where = place(file, ("motion", index))
-        path, column = motion.pop("file"), motion.pop("column", motion.get("joint"))
+    for key, index, motion in _keyframed(raw):
+        where = place(file, (key, index))
+        own = motion.get("joint" if key == "motion" else "name")
+        path, column = motion.pop("file"), motion.pop("column", own)
         try:
             if {"times", "values"} & motion.keys():
                 raise SceneError(f"{where} has both a file and a table. Keep one of them.")
@@ -48,6 +47,17 @@ def inline_keyframes(raw: dict[str, Any], folder: Path, file: str) -> list[str]:
             problems += error.problems
             motion["times"], motion["values"] = [0.0, 1.0], [0.0, 0.0]
     return problems
+
+
+def _keyframed(raw: dict[str, Any]) -> Iterator[tuple[str, int, dict[str, Any]]]:
+    """Tables with keyframes in a file: their key, number and content."""
+    for key in ("motion", "actuator"):
+        tables = raw.get(key)
+        for index, table in enumerate(tables if isinstance(tables, list) else []):
+            if not isinstance(table, dict) or "file" not in table:
+                continue
+            if key == "actuator" or table.get("kind") == "keyframes":
+                yield key, index, table
 
 
 def read_columns(path: Path, column: str, where: str) -> tuple[list[float], list[float]]:

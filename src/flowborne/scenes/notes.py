@@ -32,11 +32,13 @@ from flowborne.scenes.dye import DyeBox
 from flowborne.scenes.earlier import earlier_of
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.schema_bodies import SolidsTable
+from flowborne.solids.actuators import actuator_servos
 from flowborne.solids.geoms import floors
 from flowborne.solids.mending import joined_pairs, mended_meshes
 from flowborne.solids.mjcf import MjSpec
 from flowborne.solids.model import HINGE, SLIDE, SolidModel, joint_kind, joint_unit
 from flowborne.solids.model_checks import bodies_with_own_inertia, disabled_parts, replaced_options
+from flowborne.solids.sensors import late_sensors, unread_sensors
 
 
 def notes_of(scene: Scene, model: SolidModel) -> Iterator[str]:
@@ -164,27 +166,36 @@ def _model_file(scene: Scene, model: SolidModel) -> Iterator[str]:
     spec, step = spec_of(scene), scene.frame_time / scene.time.steps_per_frame
     name, on_floors = scene.model_path.name, bool(floors(model.mj))
     options = replaced_options(spec, scene.gravity, step, on_floors)
-    unused = [*options, *_elements(scene, spec), *_densities(scene.solids, spec)]
+    unused = [*options, *_elements(scene, spec, model), *_densities(scene.solids, spec)]
     if unused:
         yield f"[solids]: of {name} these have no effect: {'; '.join(unused)}"
     if off := disabled_parts(spec):
         yield f"[solids]: {name} itself switches off its {listed(off)} by <flag>"
 
 
-def _elements(scene: Scene, spec: MjSpec) -> Iterator[str]:
+def _elements(scene: Scene, spec: MjSpec, model: SolidModel) -> Iterator[str]:
     keys = [key.name or f"keyframe {n}" for n, key in enumerate(spec.keys)]
     if keys and scene.initial.keyframe is None:
         yield f"keyframes {listed(keys)}, of which [initial] keyframe takes one"
     assert scene.solids is not None
-    hold = bool(scene.solids.hold)
-    servos = sum(bool(actuator.biasprm[1] < 0.0) for actuator in spec.actuators)
-    others = len(spec.actuators) - servos * hold
-    if others and scene.policy is None:
-        yield f"{others} actuator{'s' * (others > 1)}, which a script or a policy drives" + (
-            f", and of which [solids] hold = true takes {servos}" if servos and not hold else ""
-        )
-    if spec.sensors:
-        yield f"{len(spec.sensors)} sensor{'s' * (len(spec.sensors) > 1)}"
+    hold, told = scene.solids.hold, scene.told_actuators()
+    servos = {
+        model.actuator_names[servo.number]: servo.joint
+        for servo in actuator_servos(model)
+        if servo.kind == "position"
+    }
+    taken = [name for name, joint in servos.items() if hold is True or (hold and joint in hold)]
+    idle = [name for name in model.actuator_names if name not in (*told, *taken)]
+    if idle:
+        one = len(idle) == 1
+        yield (
+            f"actuator{'s' * (not one)} {listed(idle)}, which nothing tells: [[actuator]], "
+            f"[policy] or a script tells {'it' if one else 'them'}"
+        ) + (f", and [solids] hold = true takes {listed([*servos])}" if servos and not hold else "")
+    if unread := unread_sensors(model):
+        yield f"sensors {listed(unread)}, which a plugin or callback would compute"
+    if late := late_sensors(model):
+        yield f"delay and interval of sensors {listed(late)}, which are read at each frame's end"
 
 
 def _densities(given: SolidsTable, spec: MjSpec) -> Iterator[str]:

@@ -25,6 +25,7 @@ from flowborne.control.objective_kinds import AnyObjective
 from flowborne.kernels.arrays import Array
 from flowborne.runs.exporters import EXPORTERS, can_write, endings
 from flowborne.runs.run_folder import FIXED_NAMES
+from flowborne.scenes.actuators import ActuatorTable
 from flowborne.scenes.changes import ChangeTable
 from flowborne.scenes.control import ControllerTable, ControlTable
 from flowborne.scenes.domain import Domain, FluidTable
@@ -127,7 +128,7 @@ class Scene(Table):
     figure       figure or section of the paper, or the case
     dimensions   2: a slab one cell thick, everything per unit depth; 3
     gravity      m/s^2
-    constants    name -> number, for the formulas of [[motion]] and [[mouths]]
+    constants    name -> number, for the formulas of [[motion]], [[actuator]] and [[mouths]]
     plugins      Python files in the scene's folder that register parts of the user
     """
 
@@ -152,6 +153,7 @@ class Scene(Table):
     earlier: EarlierTable | None = None
     initial: InitialTable = InitialTable()
     motion: tuple[MotionTable, ...] = ()
+    actuator: tuple[ActuatorTable, ...] = ()
     wind: tuple[WindTable, ...] = ()
     mouths: tuple[MouthTable, ...] = ()
     control: tuple[ControlTable, ...] = ()
@@ -235,12 +237,12 @@ class Scene(Table):
     def can_settle(self) -> bool:
         """Whether the optimum of the objectives does not depend on time.
 
-        It does with a clip, an earlier run, a moving joint, a mouth, a plan of several knots,
-        phases, changes, a policy, or an objective with a reference motion.
+        It does with a clip, an earlier run, a moving joint, a mouth, an actuator, a plan of several
+        knots, phases, changes, a policy, or an objective with a reference motion.
         """
         moved = self.clip is not None or self.earlier is not None or bool(self.mouths)
         moved |= not all(table.rests for table in self.motion)
-        moved |= bool(self.changes) or self.policy is not None
+        moved |= bool(self.actuator) or bool(self.changes) or self.policy is not None
         planned = self.controller.knots is not None
         phased = any(table.in_phases for table in self.control)
         return not (moved or planned or phased) and all(
@@ -251,6 +253,11 @@ class Scene(Table):
         """Joints that [[control]] and [[motion]] move -> which of them does, in words."""
         moved = dict.fromkeys(self.controlled_joints(), "controlled")
         return moved | {table.joint: "moved by a [[motion]]" for table in self.motion}
+
+    def told_actuators(self) -> tuple[str, ...]:
+        """Names of the actuators that [[actuator]] or [policy] tells."""
+        told = () if self.policy is None else self.policy.actuators
+        return tuple(dict.fromkeys([*(table.name for table in self.actuator), *told]))
 
     def scalars(self) -> tuple[str, ...]:
         """Names of the dyes, each once, in the order of the file."""

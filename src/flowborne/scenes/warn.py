@@ -112,7 +112,8 @@ def limp_joints(scene: Scene, setup: Setup) -> Iterator[str]:
         yield (
             f"[solids]: nothing drives {listed(limp)}, and no stiffness holds "
             f"{'it' if len(limp) == 1 else 'them'}; hold = true keeps joints as they start, "
-            "[[motion]] and [[control]] move them, and stiffness in the model makes them springs"
+            "[[motion]], [[control]] and [[actuator]] move them, and stiffness in the model makes "
+            "them springs"
         )
 
 

@@ -19,6 +19,8 @@ from flowborne.runs.history import OF_BODIES, POSE, body_columns, joint_column
 from flowborne.sim.frame import FrameReport, Snapshot
 from flowborne.solids.geoms import quaternion_of
 from flowborne.solids.model import HINGE, SLIDE, SolidModel
+from flowborne.solids.motors import activations_of, inputs_of, outputs_of
+from flowborne.solids.sensors import readings, sensor_columns
 
 if TYPE_CHECKING:
     from flowborne.control.controller import Controller
@@ -59,6 +61,8 @@ class Columns:
 
       frame, time_s
       angle_<joint>_rad … power_<joint>_W       joints and their drives; see `of_joints`
+      actuator_<name>_force … _control          of actuators that have controls; `of_actuators`
+      sensor_<name>_<unit>                      of every sensor of the model
       objective                                 of the last decision, as its trials evaluate it; see
                                                 `Decision`
       measured_<term>                           each term without its weight, in the last step
@@ -94,6 +98,7 @@ class Columns:
         bodies: tuple[str, ...] = (),
         joints: bool | tuple[str, ...] = True,
         told: tuple[str, ...] = (),
+        actuators: tuple[str, ...] = (),
     ) -> None:
         self._controller = controller
         dofs = np.zeros(0, np.int64) if controller is None else controller.dofs
@@ -101,6 +106,8 @@ class Columns:
         quantities = (
             Quantity(("frame", "time_s"), lambda now: (now.frame, now.world.time), False),
             *of_joints(setup, dofs, joints, told),
+            *of_actuators(setup.solid, actuators),
+            Quantity(sensor_columns(setup.solid), sensor_values, False),
             *of_objective(controller),
             *of_forces(stream, dofs),
             *of_bodies(setup.solid, bodies),
@@ -211,6 +218,49 @@ def of_joints(
     yield Quantity([*followed], targets, False)
     yield Quantity([column for column, _ in force], forces)
     yield Quantity([*power], powers)
+
+
+def of_actuators(model: SolidModel, told: tuple[str, ...]) -> Iterator[Quantity]:
+    """Force, power, control and activation of actuators, with a number where there are several.
+
+    actuator_<name>_force       mean over the frame, N or N m
+    actuator_<name>_power_W     of the force on the rate of the actuator's length, mean over the
+                                frame
+    actuator_<name>_control     held within its range; 0 in a frame that tells it nothing
+    actuator_<name>_activation  of a muscle or filter, at the end
+    """
+    Places = Callable[[SolidModel, int], slice]
+
+    def named(word: str, places: Places, unit: str = "") -> tuple[list[str], list[int]]:
+        columns, found = list[str](), list[int]()
+        for name in told:
+            own = places(model, model.actuator(name))
+            several = own.stop - own.start > 1
+            found += range(own.start, own.stop)
+            columns += [
+                f"actuator_{name}_{word}" + f"_{k}" * several + unit
+                for k in range(own.stop - own.start)
+            ]
+        return columns, found
+
+    forces, outputs = named("force", outputs_of)
+    powers, _ = named("power", outputs_of, "_W")
+    controls, inputs = named("control", inputs_of)
+    active, activations = named("activation", activations_of)
+
+    def told_controls(frame: FrameReport) -> Array:
+        return frame.controls[inputs] if frame.controls.size else np.zeros(len(inputs))
+
+    yield Quantity(forces, lambda frame: frame.mean(lambda step: step.output)[outputs])
+    yield Quantity(powers, lambda frame: frame.mean(lambda step: step.output_power)[outputs])
+    yield Quantity(controls, told_controls)
+    yield Quantity(active, lambda now: now.world.solid.act[activations], False)
+
+
+def sensor_values(now: Snapshot) -> list[float]:
+    """Readings of all sensors, in the order of their columns."""
+    found = readings(now.sensed, now.world.time).values()
+    return [float(value) for reading in found for value in reading]
 
 
 def of_objective(controller: Controller | None) -> Iterator[Quantity]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -32,6 +32,7 @@ class FrameReport:
     decided    whether the controller decided anew in this frame
     seconds    by part (`PARTS`) and "total"
     beyond     sentences: which limits what joints were told would have passed
+    controls   (nu,) of the model's actuators, 0 for those that were told nothing
     values     dotted key -> value that differs from the scene's, see [[changes]]
     """
 
@@ -45,6 +46,7 @@ class FrameReport:
     decided: bool
     seconds: dict[str, float]
     beyond: tuple[str, ...] = ()
+    controls: Array = field(default_factory=partial(np.zeros, 0))
     values: dict[str, Any] = field(default_factory=dict)
 
     @property

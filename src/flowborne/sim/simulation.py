@@ -15,6 +15,7 @@ import numpy as np
 from threadpoolctl import ThreadpoolController
 
 from flowborne.base.errors import PartError, SceneError, described
+from flowborne.base.phrases import suggestion
 from flowborne.control.commands import Commands, Drives, drives_of, told_by
 from flowborne.coupling.report import BREAKDOWNS, Outcome, StepReport
 from flowborne.coupling.stream import FlowState, flow_at
@@ -24,12 +25,15 @@ from flowborne.kernels.arrays import PRESCRIBED, Array, Integers
 from flowborne.kernels.faces import is_finite
 from flowborne.kernels.jit import LARGE, cores, kernel_threads
 from flowborne.runs.summary import BUDGET_OPEN
+from flowborne.scenes.actuators import joints_of_actuators, scene_controls
 from flowborne.scenes.changes import ChangeTable, values_at
 from flowborne.sim.columns import Columns
 from flowborne.sim.frame import PARTS, FrameReport, Snapshot
 from flowborne.solids.flesh import inversion
 from flowborne.solids.model import FREE, turning_dofs
-from flowborne.solids.sensed import BodyState, JointState
+from flowborne.solids.motors import activations_of, driven_by, outputs_of
+from flowborne.solids.sensed import ActuatorState, BodyState, JointState
+from flowborne.solids.sensors import readings
 from flowborne.solids.surfaces import geom_boxes
 from flowborne.solids.trajectories import NOTHING_TOLD
 
@@ -111,10 +115,19 @@ class Simulation:
         self.steps_per_frame = built.steps_per_frame
         self.frames = built.frames
         output, stream = self.scene.output, self.scene.stream()
+        model, actuators = built.world.setup.solid, self.scene.told_actuators()
         told = () if self.scene.policy is None else self.scene.policy.joints
+        told += joints_of_actuators(model, actuators)
         self.columns = Columns(
-            built.world.setup, self.controller, stream, output.bodies, output.joints, told
+            built.world.setup,
+            self.controller,
+            stream,
+            output.bodies,
+            output.joints,
+            told,
+            actuators,
         )
+        self._controls = scene_controls(self.scene.actuator, model, self.scene.constants)
         self._changes: tuple[ChangeTable, ...] = self.scene.changes
         self._values: dict[str, Any] = {}
         self._policy = None if self.scene.policy is None else self.scene.policy.build()
@@ -205,6 +218,7 @@ class Simulation:
             except PartError as error:
                 raise BlowUpError(self.frame + 1, 1, str(error)) from error
         beyond: tuple[str, ...] = ()
+        commands = self._with_controls(commands or {})
         if commands:
             world.told, beyond = told_by(commands, world, self.frame_time, self._drives())
         with _one_blas_thread(), kernel_threads(_threads(world.setup)):
@@ -240,6 +254,26 @@ class Simulation:
         """
         return self.snapshot().sensed.joint(name)
 
+    def actuator(self, name: str) -> ActuatorState:
+        """Force and activation of an actuator of the model now; see `ActuatorState`.
+
+        raises  ValueError for an unknown name
+        """
+        moment = self.snapshot()
+        model, number = moment.sensed.model, moment.sensed.model.actuator(name)
+        return ActuatorState(
+            moment.sensed.output[outputs_of(model, number)],
+            moment.world.solid.act[activations_of(model, number)],
+        )
+
+    def sensor(self, name: str) -> Array:
+        """(k,) reading of a sensor of the model now, in SI units; nan before the first frame for
+        what only a step gives. Raises ValueError for an unknown name."""
+        known = readings(self.snapshot().sensed, self.time)
+        if name not in known:
+            raise ValueError(f"no sensor '{name}' in the model{suggestion(name, known, 'It has')}")
+        return known[name]
+
     def _apply_changes(self) -> None:
         """Remake setup and controller where the coming frame has other values than the last one."""
         from flowborne.scenes.build import changed
@@ -262,6 +296,17 @@ class Simulation:
         from flowborne.scenes.load import raw_of
 
         return raw_of(self.scene)
+
+    def _with_controls(self, commands: Commands) -> Commands:
+        """Commands with the scene's [[actuator]]s, but for those that they tell otherwise."""
+        model = self.setup.solid
+        told = [model.dofs_of(name) for name in commands if name in model.joint_names]
+        controls = {
+            name: control
+            for name, control in self._controls(self.time, self.frame_time).items()
+            if not any(np.isin(driven_by(model, model.actuator(name)), dofs).any() for dofs in told)
+        }
+        return {**controls, **commands}
 
     def _drives(self) -> Drives:
         """Those of the scene itself."""
@@ -301,6 +346,9 @@ class Simulation:
         if self.controller is not None:
             dofs = np.asarray(self.controller.dofs)
             held.set(dofs, world.solid.v[dofs], world.solid.v[dofs])
+        if controls := self._controls(0.0, self.frame_time):
+            told, _ = told_by(controls, world, self.frame_time, self._drives())
+            world.told = replace(NOTHING_TOLD, controls=told.controls)
         try:
             with _one_blas_thread(), kernel_threads(), _enough_memory(scene):
                 start(world, self.frame_time / self.steps_per_frame, given, held)
@@ -312,7 +360,7 @@ class Simulation:
                 "or in a side of the domain, for velocities that are too large, and refine the "
                 "grid where bodies close off a pocket of few cells."
             ) from error
-        self._started = True
+        world.told, self._started = NOTHING_TOLD, True
 
     def _advance(self, world: World, frame: int, beyond: tuple[str, ...]) -> FrameReport:
         """Advance `world` by a frame, in place; `beyond` as in its report."""
@@ -364,6 +412,7 @@ class Simulation:
             decided=decided,
             seconds=seconds,
             beyond=beyond,
+            controls=np.zeros(0) if world.told.controls is None else world.told.controls.values,
             values=self._values,
         )
 

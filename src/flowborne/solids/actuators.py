@@ -1,4 +1,5 @@
-"""Actuators of an MJCF model: motors, position and velocity servos on hinges and slides."""
+"""Actuators of an MJCF model by what they are: servos of a hinge or slide, which drive it as other
+motions do, and all others, whose force MuJoCo computes (`motors`)."""
 
 from __future__ import annotations
 
@@ -12,63 +13,76 @@ import numpy as np
 
 from flowborne.solids.model import HINGE, SLIDE, SolidModel
 
+Dyn = mujoco.mjtDyn
+
 
 @dataclass(frozen=True)
-class Actuator:
-    """What an actuator does to its joint, for a control u.
+class ActuatorServo:
+    """What a position or velocity actuator does to its joint, for a control u.
 
-    name         in the model
-    joint        that it drives
-    kind         "motor": it pushes with gain u; "position": it drives the joint towards gain u, as
-                 a spring; "velocity": it drives it at gain u, as a damper
-    gain         N m or N, rad or m, rad/s or m/s for each unit of u
-    offset       what it does at u = 0, likewise
-    least, most  of u
-    limit        largest torque or force, N m or N
-    frequency    rad/s, sqrt(kp / M) of a position servo with the joint's inertia M at rest
+    number     in the model
+    joint      that it drives
+    kind       "position": it drives the joint towards gain u, as a spring; "velocity": it drives
+               it at gain u, as a damper
+    gain       rad or m, rad/s or m/s for each unit of u
+    offset     what it does at u = 0, likewise
+    limit      largest torque or force, N m or N
+    frequency  rad/s, sqrt(kp / M) of a position servo with the joint's inertia M at rest
     """
 
-    name: str
+    number: int
     joint: str
-    kind: Literal["motor", "position", "velocity"]
+    kind: Literal["position", "velocity"]
     gain: float
     offset: float
-    least: float
-    most: float
     limit: float
     frequency: float
 
     def wanted(self, u: float) -> float:
-        """What it does for a control, which is held within its range."""
-        return self.offset + self.gain * min(max(u, self.least), self.most)
+        """What it does for a control."""
+        return self.offset + self.gain * u
 
 
-def actuators(model: SolidModel) -> Iterator[Actuator]:
-    """Those of the model that are understood: the force gear (g u + b0 + b1 l + b2 v) on a joint,
-    with l and v gear times its position and velocity (MuJoCo's affine bias)."""
+def actuator_servos(model: SolidModel) -> Iterator[ActuatorServo]:
+    """Those of the model with the force gear (g u + b0 + b1 l + b2 v) on a hinge or slide, with l
+    and v gear times its position and velocity (MuJoCo's affine bias), and b1 < 0 or b2 < 0."""
     mj, plain, Bias = model.mj, mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias
-    for a in range(mj.nu):
+    for a in range(mj.nactuator):
         on_joint = mj.actuator_trntype[a] == mujoco.mjtTrn.mjTRN_JOINT
         number, gear = int(mj.actuator_trnid[a, 0]), float(mj.actuator_gear[a, 0])
         bias = mj.actuator_biastype[a]
         known = bias == Bias.mjBIAS_NONE or bias == Bias.mjBIAS_AFFINE
         known &= mj.actuator_gaintype[a] == plain
-        known &= mj.actuator_dyntype[a] == mujoco.mjtDyn.mjDYN_NONE and gear != 0.0
+        known &= mj.actuator_dyntype[a] == Dyn.mjDYN_NONE and gear != 0.0
         if not (on_joint and known and mj.jnt_type[number] in (HINGE, SLIDE)):
             continue
         g, (b0, b1, b2) = float(mj.actuator_gainprm[a, 0]), mj.actuator_biasprm[a, :3].tolist()
-        kind: Literal["motor", "position", "velocity"] = "motor"
-        unit, frequency = 1.0 / gear, 0.0
+        kind: Literal["position", "velocity"] = "velocity"
+        unit, frequency = -b2 * gear, 0.0
         if b1 < 0.0:
             kind, unit = "position", -b1 * gear
             frequency = math.sqrt(-b1 * gear * gear / mj.dof_M0[mj.jnt_dofadr[number]])
-        elif b2 < 0.0:
-            kind, unit = "velocity", -b2 * gear
+        elif b2 >= 0.0:
+            continue
         limit = math.inf
         if mj.actuator_forcelimited[a]:
             limit = abs(gear) * float(np.abs(mj.actuator_forcerange[a]).min())
-        least, most = -math.inf, math.inf
-        if mj.actuator_ctrllimited[a]:
-            least, most = mj.actuator_ctrlrange[a].tolist()
-        name, joint = mj.actuator(a).name, model.joint_names[number]
-        yield Actuator(name, joint, kind, g / unit, b0 / unit, least, most, limit, frequency)
+        yield ActuatorServo(
+            a, model.joint_names[number], kind, g / unit, b0 / unit, limit, frequency
+        )
+
+
+def unusable_actuator(model: SolidModel, number: int) -> str | None:
+    """Why an actuator cannot act, a sentence; None where it can."""
+    mj, name = model.mj, model.actuator_names[number]
+    own = mj.actuator_plugin[number] >= 0 or mj.actuator_dyntype[number] == Dyn.mjDYN_USER
+    own |= mj.actuator_gaintype[number] == mujoco.mjtGain.mjGAIN_USER
+    own |= mj.actuator_biastype[number] == mujoco.mjtBias.mjBIAS_USER
+    if own:
+        return (
+            f"actuator '{name}' is computed by a plugin or callback, which is not called. "
+            "Give it a type of MuJoCo's own, or tell joints."
+        )
+    if mj.actuator_delay[number] > 0.0:
+        return f"actuator '{name}' has a delay, which is not simulated. Remove it from the model."
+    return None

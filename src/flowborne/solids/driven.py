@@ -7,13 +7,15 @@ Method: docs/method/bodies.md.
 from __future__ import annotations
 
 import numpy as np
+from scipy.sparse import csr_array
 
-from flowborne.kernels.arrays import Array, Mask
+from flowborne.kernels.arrays import Array
 from flowborne.solids.dynamics import assemble
 from flowborne.solids.flesh_dynamics import assemble_flesh
 from flowborne.solids.flesh_solve import prescribe_flesh
 from flowborne.solids.model import SolidModel, SolidState
 from flowborne.solids.prescribed import Driven, prescribe
+from flowborne.solids.trajectories import JointCommand
 
 LIMIT_TOLERANCE = 1e-9
 """Relative excess of a drive over its limit, or of a dof over its velocity, that is ignored."""
@@ -28,24 +30,25 @@ def drive(
     applied: Array,
     dt: float,
     before: SolidState | None,
-    prescribed: Mask,
-    hold: Array,
-    limit: Array,
+    command: JointCommand,
+    added: csr_array | None = None,
 ) -> Driven:
-    """The bodies at `state` under generalised forces (nv,), with prescribed dofs (nv,) that end the
-    step with velocities `hold` (nv,).
+    """The bodies at `state` under generalised forces (nv,), with driven dofs.
 
-    before  state before the positions moved; see `assemble`
-    limit   (nv,) largest |generalised force| of each drive, inf for none; a drive with a limit may
-            not reach `hold`, so the first Coriolis forces do not assume that it does
-    raises  BreakdownError when the matrix of the free dofs is not positive definite
+    before   state before the positions moved; see `assemble`
+    command  a drive with a torque limit may not reach its final velocity, so the first Coriolis
+             forces do not assume that it does
+    added    as in `assemble`
+    raises   BreakdownError when the matrix of the free dofs is not positive definite
     """
-    exact = prescribed & np.isinf(limit)
+    prescribed, hold = command.prescribed, command.final_velocity
+    exact = prescribed & np.isinf(command.torque_limit)
     if model.flesh is not None:
-        flesh = assemble_flesh(model, state, applied, dt, before, exact)
+        flesh = assemble_flesh(model, state, applied, dt, before, exact, added)
         return prescribe_flesh(flesh, prescribed, hold)
     guess = np.where(exact, hold, state.v)
-    return prescribe(assemble(model, state, applied, dt, before, guess, exact), prescribed, hold)
+    system = assemble(model, state, applied, dt, before, guess, exact, added)
+    return prescribe(system, prescribed, hold)
 
 
 def within_limits(driven: Driven, limit: Array, v_plus: Array, actuator: Array) -> Driven | None:

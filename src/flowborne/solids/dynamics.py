@@ -267,6 +267,7 @@ def assemble(
     before: SolidState | None = None,
     guess: Array | None = None,
     exact: Mask | None = None,
+    added: csr_array | None = None,
 ) -> SolidSystem:
     """System of the bodies alone at `state`, with gravity, springs, limits and contact.
 
@@ -285,6 +286,8 @@ def assemble(
              acceleration solves A a = b
     guess    (nv,) velocity after the step for the first Coriolis forces; v when None
     exact    (nv,) dofs with a drive of any force, see `Scratch.stiffen`
+    added    (nv, nv) positive semidefinite matrix by which A is larger: that of applied forces that
+             yield to the change of velocity
     raises   ValueError when the model has flesh
     """
     if model.flesh is not None:
@@ -295,6 +298,8 @@ def assemble(
     s.forward(state.q, state.v, applied)
     mass = s.mass_matrix().copy()
     A, force = _smooth(model, s, mass)
+    if added is not None:
+        A = A + added.toarray()
     rows, zones = rows_of(model, s)
     v, still = state.v.copy(), A @ state.v
     middle, impulse, known = None, still + dt * force, None

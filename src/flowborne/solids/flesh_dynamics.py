@@ -62,6 +62,7 @@ def assemble_flesh(
     dt: float,
     before: SolidState | None = None,
     exact: Mask | None = None,
+    added: csr_array | None = None,
 ) -> FleshSystem:
     """System of bones and flesh at `state`, with gravity, springs, dampers, limits and contact.
 
@@ -74,6 +75,7 @@ def assemble_flesh(
     applied  (nv,) generalised force, N or N m
     dt       s
     before, exact  as in `assemble`
+    added    as in `assemble`; only entries between dofs of the pattern
     """
     s = scratch(model)
     s.set_time_step(dt)
@@ -84,6 +86,9 @@ def assemble_flesh(
     M, (stiff, elastic) = sparse_mass(model, s), _flesh(model, s)
     whole, half = _jointed(model, s, centred, dt), 0.5 * dt**2 * stiff
     whole[pattern.of_mass] += M.data
+    if added is not None:
+        entries = added.tocoo()
+        whole[pattern.places(*entries.coords)] += entries.data
     whole += half
     whole += 0.5 * dt * damping * stiff
     A, K = pattern.filled(whole), pattern.filled(stiff)

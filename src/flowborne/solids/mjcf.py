@@ -86,8 +86,8 @@ def bones_of(
 ) -> tuple[MjSpec, MjModel]:
     """The spec and MuJoCo's model of an MJCF file (a Path) or text (a str), without flesh.
 
-    MuJoCo's own medium, actuators, sleeping and noslip pass are switched off: the fluid, the
-    motions and the controller replace them.
+    MuJoCo's own medium, sleeping and noslip pass are switched off, which the fluid replaces, and so
+    are actuators and sensors, which `motors` and `sensors` switch on where they are computed.
     raises  ValueError for a bad model
     """
     where = _named(source)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, field
+from functools import cached_property, partial
 from pathlib import Path
 
 import mujoco
@@ -40,15 +40,17 @@ JOINT_KINDS = {HINGE: "hinge", SLIDE: "slide", BALL: "ball joint", FREE: "free j
 class SolidState:
     """Positions and velocities of the articulated bodies in generalised coordinates.
 
-    q  (nq,) MuJoCo's qpos: m, rad, unit quaternions
-    v  (nv,) MuJoCo's qvel: m/s, rad/s
+    q    (nq,) MuJoCo's qpos: m, rad, unit quaternions
+    v    (nv,) MuJoCo's qvel: m/s, rad/s
+    act  (na,) activations of muscles and other actuators that have some
     """
 
     q: Array
     v: Array
+    act: Array = field(default_factory=partial(np.zeros, 0))
 
     def copy(self) -> SolidState:
-        return SolidState(self.q.copy(), self.v.copy())
+        return SolidState(self.q.copy(), self.v.copy(), self.act.copy())
 
 
 class SolidModel:
@@ -61,11 +63,14 @@ class SolidModel:
     slab           whether the solids are cross-sections at z = 0
     gravity        (3,) m/s^2
     nq, nv         numbers of positions and velocities
+    outputs        number of forces of actuators
     nbody, ngeom   numbers of bodies (0 is the world), without nodes of flesh, and of geometries
     flesh          the flesh of the model, or None
     body_names, joint_names, dof_names, geom_names
                    nameless elements get their kind and number; the dofs of a free joint have the
                    name of the joint with :x :y :z (world axes) :rx :ry :rz (body axes)
+    actuator_names, sensor_names
+                   likewise
     locked         (nv,) dofs of a slab that would leave the plane
     dof_position   (nv,) index in q of the position of a hinge or slide, -1 for other dofs
     dof_range      (nv, 2) limits of hinges and slides, rad or m; infinite without limits
@@ -73,7 +78,7 @@ class SolidModel:
     dof_root       (nv,) ancestor of that body that is a child of the world
     moves          (nbody, nv) whether a dof moves a body
     conserved      (nv,) dofs along which only external forces change the momentum of the bodies
-    armature       (nv,) inertia of the joints, kg m^2 or kg
+    armature       (nv,) inertia of the joints and of actuators on them, kg m^2 or kg
     body_mass      (nbody + nodes,) kg; nodes of flesh come after the bodies
     subtree_mass   (nbody + nodes,) kg, of the body and all below
     volume         (nbody,) displaced volume, m^3 (area in a slab); overlaps of geometries of a
@@ -104,10 +109,14 @@ class SolidModel:
         self.slab = slab
         self.gravity: Array = np.array(mj.opt.gravity)
         self.nq, self.nv, self.nbody = int(mj.nq), int(mj.nv), _bones(mj, grown)
+        self.outputs = int(mj.actuator_outnum.sum())
         self.body_mass: Array = np.array(mj.body_mass)
         self.subtree_mass: Array = np.array(mj.body_subtreemass)
         self.body_names = _names(mj, mujoco.mjtObj.mjOBJ_BODY, self.nbody)
         self._bodies = {name: b for b, name in enumerate(self.body_names)}
+        self.actuator_names = _names(mj, mujoco.mjtObj.mjOBJ_ACTUATOR, mj.nactuator)
+        self._actuators = {name: a for a, name in enumerate(self.actuator_names)}
+        self.sensor_names = _names(mj, mujoco.mjtObj.mjOBJ_SENSOR, mj.nsensor)
         self._rest = geoms.rest_poses(mj)
         self._set_dofs()
         self.flesh = flesh_of(self, slab, grown) if grown else None
@@ -179,7 +188,7 @@ class SolidModel:
 
     def rest(self) -> SolidState:
         """The rest pose of the model, without velocity."""
-        return SolidState(np.array(self.mj.qpos0), np.zeros(self.nv))
+        return SolidState(np.array(self.mj.qpos0), np.zeros(self.nv), np.zeros(self.mj.na))
 
     def at_keyframe(self, mj: mujoco.MjModel, name: str) -> SolidState:
         """State at a keyframe of `mj`, a model that has some of these joints; others rest."""
@@ -189,6 +198,8 @@ class SolidModel:
             first, speed = mj.jnt_qposadr[j], mj.jnt_dofadr[j]
             state.q[indices] = key.qpos[first : first + len(indices)]
             state.v[dofs] = key.qvel[speed : speed + len(dofs)]
+        if mj.na == self.mj.na:  # flesh and floating bodies add no actuators
+            state.act[:] = key.act
         return state
 
     def integrate(self, q: Array, velocity: Array, dt: float) -> Array:
@@ -255,6 +266,10 @@ class SolidModel:
         """Number of a joint. Raises ValueError for an unknown name."""
         return _number(self._joints, name, "joint")
 
+    def actuator(self, name: str) -> int:
+        """Number of an actuator. Raises ValueError for an unknown name."""
+        return _number(self._actuators, name, "actuator")
+
     def body(self, name: str) -> int:
         """Number of a body. Raises ValueError for an unknown name."""
         return _number(self._bodies, name, "body")
@@ -285,7 +300,7 @@ class SolidModel:
         self.moves: Mask = np.zeros((self.nbody, self.nv), bool)
         for body in range(1, self.nbody):
             self.moves[body] = self.moves[mj.body_parentid[body]] | (self.dof_body == body)
-        self.armature: Array = np.array(mj.dof_armature)
+        self.armature: Array = _armature(mj)
         self.conserved = _conserved(mj)
         self.locked: Mask = np.zeros(self.nv, bool)
         if self.slab:
@@ -379,6 +394,17 @@ def _number(numbers: Mapping[str, int], name: str, what: str) -> int:
     if name not in numbers:
         raise ValueError(f"no {what} '{name}' in the model. It has: {', '.join(numbers)}.")
     return numbers[name]
+
+
+def _armature(mj: mujoco.MjModel) -> Array:
+    """(nv,) inertia that turns with a joint and is not that of a body."""
+    armature = np.array(mj.dof_armature)
+    for actuator in np.flatnonzero(mj.actuator_armature):
+        joint = int(mj.actuator_trnid[actuator, 0])
+        if mj.actuator_trntype[actuator] == mujoco.mjtTrn.mjTRN_JOINT:
+            gear = float(mj.actuator_gear[actuator, 0])
+            armature[mj.jnt_dofadr[joint]] += gear**2 * mj.actuator_armature[actuator]
+    return armature
 
 
 def _conserved(mj: mujoco.MjModel) -> Mask:

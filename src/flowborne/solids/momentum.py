@@ -6,7 +6,7 @@ from copy import copy
 
 import mujoco
 import numpy as np
-from scipy.sparse import csr_array
+from scipy.sparse import csr_array, diags_array
 
 from flowborne.kernels.arrays import Array
 from flowborne.kernels.momentum import about_origin, momentum_impulse
@@ -74,6 +74,7 @@ def halfway_momentum(model: SolidModel, state: SolidState, dt: float) -> Array:
 def mass_matrix(model: SolidModel, q: Array) -> Array:
     """(nv, nv) joint space mass matrix, armature included."""
     s = posed(model, q)
+    mujoco.mj_tendon(s.mj, s.data)  # tendons may have armature
     mujoco.mj_makeM(s.mj, s.data)
     return s.mass_matrix().copy()
 
@@ -81,11 +82,28 @@ def mass_matrix(model: SolidModel, q: Array) -> Array:
 def mass_times(model: SolidModel, q: Array, velocities: Array) -> Array:
     """(k, nv) the mass matrix at q (nq,), without storing it, times each velocity (k, nv)."""
     s = posed(model, q)
+    mujoco.mj_tendon(s.mj, s.data)  # tendons may have armature
     mujoco.mj_makeM(s.mj, s.data)
     result = np.empty(velocities.shape)
     for row, velocity in zip(result, velocities, strict=True):
         mujoco.mj_mulM(s.mj, s.data, row, velocity)
     return result
+
+
+def tendon_inertia(s: Scratch) -> csr_array | None:
+    """(nv, nv) part of the mass matrix that is the armature of tendons and of actuators on them, at
+    the pose in `s`; None without any. Call it after MuJoCo's forward pass."""
+    mj = s.mj
+    armature = np.array(mj.tendon_armature)
+    for actuator in np.flatnonzero(mj.actuator_armature):
+        if mj.actuator_trntype[actuator] == mujoco.mjtTrn.mjTRN_TENDON:
+            gear = float(mj.actuator_gear[actuator, 0])
+            armature[mj.actuator_trnid[actuator, 0]] += gear**2 * mj.actuator_armature[actuator]
+    if not armature.any():
+        return None
+    start = np.concatenate([[0], np.cumsum(mj.ten_J_rownnz, dtype=np.int64)])
+    J = csr_array((s.data.ten_J.copy(), mj.ten_J_colind, start), (mj.ntendon, mj.nv))
+    return csr_array(J.T @ diags_array(armature) @ J)
 
 
 def kinetic_energy(model: SolidModel, state: SolidState) -> float:
@@ -131,6 +149,7 @@ class Halfway:
         """
         self._model, self._state, self._dt = model, state.copy(), dt
         self._still, self._mass, self._outer = still, mass, outer
+        self._tendons = tendon_inertia(s)
         self._twist = twists_about_origin(s.cdof, s.dof_centre())
         fall = dt * weight(model, s)
         self._given = subtree_halfway_momentum(model, s, before, dt) + fall
@@ -162,6 +181,8 @@ class Halfway:
         bias = np.empty(model.nv)
         mujoco.mj_rne(s.mj, s.data, 0, bias)
         gained = self._mass @ (v_plus - v) - model.armature * (v_plus - v)
+        if self._tendons is not None:
+            gained -= self._tendons @ (v_plus - v)
         return later, gained, bias
 
     def _sum(self, terms: Terms) -> tuple[Array, Array]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -75,6 +75,18 @@ class JointState:
 
 
 @dataclass(frozen=True, eq=False)
+class ActuatorState:
+    """An actuator of the model after a step; nan before the first.
+
+    force       (k,) N or N m, positive where it lengthens; one number, three of a ball joint
+    activation  (m,) of a muscle or filter; empty without
+    """
+
+    force: Array
+    activation: Array
+
+
+@dataclass(frozen=True, eq=False)
 class Sensed:
     """What can be sensed of bodies and joints at the end of a step or a frame.
 
@@ -86,6 +98,7 @@ class Sensed:
     actuator      (nv,) generalised force of the drives in that step, N or N m
     wrench        (nbody, 6) of fluid and winds, about the bodies' centres of mass
     added_mass    gives (nbody, 6) the part of it that resists the bodies' acceleration
+    output        (n,) forces of the model's actuators in that step, N or N m
     """
 
     model: SolidModel
@@ -96,26 +109,30 @@ class Sensed:
     actuator: Array
     wrench: Array
     added_mass: Callable[[], Array]
+    output: Array = field(default_factory=partial(np.zeros, 0))
 
     @classmethod
     def before_steps(cls, model: SolidModel, q: Array) -> Sensed:
         """Of the start, where only positions are known."""
         drives, wrench = np.full(model.nv, np.nan), np.full((model.nbody, 6), np.nan)
-        return cls(model, q, drives, drives, np.nan, drives, wrench, lambda: wrench)
+        output = np.full(model.outputs, np.nan)
+        return cls(model, q, drives, drives, np.nan, drives, wrench, lambda: wrench, output)
 
     def arrays(self) -> dict[str, Array]:
         """What a step told, as named arrays; none before the first."""
         if np.isnan(self.dt):
             return {}
         named = {name: np.asarray(getattr(self, name)) for name in OF_STEP}
+        if self.output.size:
+            named["output"] = self.output
         return named | {"added_mass": self.added_mass()}
 
     @classmethod
     def from_arrays(cls, model: SolidModel, q: Array, arrays: dict[str, Array]) -> Sensed:
         """The way back."""
         told = {name: arrays[name] for name in OF_STEP} | {"dt": float(arrays["dt"])}
-        added = arrays["added_mass"]
-        return cls(model, q, **told, added_mass=lambda: added)  # type: ignore[arg-type]
+        added, output = arrays["added_mass"], arrays.get("output", np.zeros(model.outputs))
+        return cls(model, q, **told, added_mass=lambda: added, output=output)  # type: ignore[arg-type]
 
     def body(self, name: str) -> BodyState:
         """A body's state. Raises ValueError for an unknown name."""

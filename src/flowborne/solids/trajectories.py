@@ -7,6 +7,7 @@ muscles", which the paper uses.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -14,6 +15,7 @@ import numpy as np
 
 from flowborne.kernels.arrays import Array, Integers, Mask
 from flowborne.solids.model import SolidModel
+from flowborne.solids.motors import Controls
 
 
 class Trajectory(Protocol):
@@ -235,14 +237,18 @@ class TrajectoryKnots:
 class Told:
     """What joints are told from outside. Neither the scene's motions nor its controller moves them.
 
-    motions  to their targets
-    pushed   (k,) dofs that a force drives
-    force    (k,) N m or N
+    motions   to their targets
+    pushed    (k,) dofs that a force drives
+    force     (k,) N m or N
+    controls  of actuators, None where none has one
+    servos    actuators that drive a joint as its servo, and its dof
     """
 
     motions: tuple[Trajectory, ...]
     pushed: Integers
     force: Array
+    controls: Controls | None = None
+    servos: Sequence[tuple[int, int]] = ()
 
     def force_on(self, nv: int) -> Array:
         """(nv,) generalised force."""
