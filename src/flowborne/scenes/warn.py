@@ -31,6 +31,7 @@ from flowborne.scenes.warn_bodies import (
     thin_bodies,
 )
 from flowborne.scenes.warn_speed import fast_bodies, fast_flow, unlike_the_sea
+from flowborne.scenes.warn_trim import counted_twice, pinned_under_lid
 from flowborne.solids.model import SLIDE, joint_kind, joint_unit
 
 LEAST_STRENGTH = 2.0 * math.pi
@@ -136,6 +137,8 @@ WARNINGS: tuple[Warn, ...] = (
     implausible_density,
     mass_apart,
     bodies_not_met,
+    counted_twice,
+    pinned_under_lid,
     floors_in_fluid,
     fixed_outside,
     fast_bodies,

@@ -10,10 +10,11 @@ import numpy as np
 from flowborne.base.phrases import and_more, listed, rounded_down, rounded_up
 from flowborne.coupling.world import Fluid, Setup
 from flowborne.scenes.bodies import initial_state
-from flowborne.scenes.creature import counted_bodies, creature_extent, unmet_bodies
+from flowborne.scenes.creature import counted_bodies, creature_extent, displaced_mass, unmet_bodies
 from flowborne.scenes.domain import Domain, fits_memory
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.seen import Seen, seen_bodies
+from flowborne.solids.enclosed import enclosing_geoms
 from flowborne.solids.geoms import floors, geom_name, kind_of, rest_poses
 from flowborne.solids.model import SolidModel
 from flowborne.solids.surfaces import geom_boxes
@@ -165,14 +166,11 @@ def mass_apart(scene: Scene, setup: Setup) -> Iterator[str]:
     model, fluid = setup.solid, setup.fluid
     if fluid is None or fluid.one_way or is_gas(fluid) or any(implausible_density(scene, setup)):
         return
-    moving = model.moving
-    mass, displaced = model.body_mass[: model.nbody][moving].sum(), model.volume[moving].sum()
-    if model.flesh is not None:
-        mass += model.body_mass[model.nbody :].sum()
-        displaced += model.flesh.volumes.sum()
-    if not displaced:
+    counted = counted_bodies(model)
+    mass, displaced = model.body_mass[counted].sum(), displaced_mass(setup, counted)
+    if not (displaced and model.moving.any()):
         return
-    times = float(mass / (fluid.density * displaced))
+    times = float(mass / displaced)
     if LIGHT <= times <= HEAVY:
         return
     yield (
@@ -195,10 +193,15 @@ the mass is less than a force of the fluid is right to on the grids that films h
 
 
 def bodies_not_met(scene: Scene, setup: Setup) -> Iterator[str]:
-    """Moving bodies that displace no fluid, though they have geoms that could, or mass."""
+    """Moving bodies that displace no fluid, though they have geoms that could, or mass.
+
+    Ballast inside a hull is none of them.
+    """
     if setup.fluid is None:
         return
     model, unmet = setup.solid, unmet_bodies(setup.solid)
+    outside = model.mj.geom_bodyid[enclosing_geoms(model) < 0]
+    unmet = unmet[(model.mj.body_geomnum[unmet] == 0) | np.isin(unmet, outside)]
     bare = model.mj.body_geomnum[unmet] == 0
     whole = model.body_mass[counted_bodies(model)].sum()
     named = unmet
