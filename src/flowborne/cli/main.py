@@ -25,7 +25,14 @@ from typer.core import TyperGroup
 from flowborne.base.errors import PartError, SceneError, fault_of
 from flowborne.base.extras import check_drawing, missing_to_draw, optional
 from flowborne.base.version import __version__
-from flowborne.cli.console import batch_lines, check_lines, complain, run_lines, sentence_of
+from flowborne.cli.console import (
+    batch_lines,
+    check_lines,
+    complain,
+    is_started,
+    run_lines,
+    sentence_of,
+)
 from flowborne.runs.run_folder import RunFolder, RunFolderError, cannot_write
 
 log = logging.getLogger("flowborne")
@@ -314,8 +321,8 @@ def check(
     """Describe the creature, list everything that is wrong or implausible in a scene, and say how
     the grid resolves its bodies.
 
-    Bodies and fluid are started as in a run. A warning does not stop a run; it names a suitable
-    value.
+    Bodies and fluid are started as in a run, on grids of up to 4 million cells. A warning does not
+    stop a run; it names a suitable value.
     """
     from flowborne.scenes.load import load_scene
     from flowborne.scenes.warn import warnings_of
@@ -325,7 +332,9 @@ def check(
         from flowborne.sim.simulation import Simulation
 
         with Simulation(loaded, workers=1) as simulation:
-            setup = simulation.world.setup
+            setup = simulation.setup
+            if is_started(setup):
+                simulation.snapshot()
     found = warnings_of(loaded, setup)
     print(check_lines(loaded, setup, found))
     if strict and found:
