@@ -211,3 +211,31 @@ def test_an_inertia_that_mujoco_refuses_names_the_body_and_a_remedy_that_works(
     assert remedy in str(raised.value)
     path.write_text(robot.replace("</robot>", f"<mujoco>{remedy}</mujoco></robot>"))
     assert compiled(path).nbody > 1
+
+
+@pytest.mark.parametrize("name", ["arm.URDF", "arm.Urdf", "arm.xml", "arm"])
+@pytest.mark.parametrize("before", ["", "<!-- from a\nsketch -->\n", "\n  "])
+def test_a_urdf_is_known_by_its_content_and_may_begin_with_a_comment(
+    tmp_path: Path, name: str, before: str
+) -> None:
+    robot = URDF.format(mesh="link.STL", ixx=1, mass=1)
+    declared = f"{before}<?xml version='1.0' encoding='utf-8'?>\n{robot}"
+    path = written(tmp_path, {name: declared, "link.STL": STL})
+    mj = compiled(path)
+    assert (mj.nmesh, mj.njnt) == (1, 1)
+    text = gathered(path).texts["arm.urdf"].decode()
+    assert text.startswith("<?xml")
+    assert text.count("\n") == declared.count("\n")
+    copied(gathered(path), tmp_path / "copy")
+
+
+@pytest.mark.parametrize("name", ["ball.MJCF", "ball.XML", "ball.mjcf"])
+def test_mjcf_is_known_by_its_content(tmp_path: Path, name: str) -> None:
+    """As the model of a scene, and as one that another attaches."""
+    ball = "<mujoco><worldbody><body name='ball'><geom size='0.1'/></body></worldbody></mujoco>"
+    whole = (
+        f"<mujoco><asset><model name='ball' file='{name}'/></asset><worldbody>"
+        "<attach model='ball' body='ball' prefix='a_'/></worldbody></mujoco>"
+    )
+    path = written(tmp_path, {"whole.xml": whole, name: ball})
+    assert compiled(path).nbody == compiled(tmp_path / name).nbody == 2
