@@ -239,3 +239,24 @@ def test_mjcf_is_known_by_its_content(tmp_path: Path, name: str) -> None:
     )
     path = written(tmp_path, {"whole.xml": whole, name: ball})
     assert compiled(path).nbody == compiled(tmp_path / name).nbody == 2
+
+
+MUSCLE = """<mujoco><worldbody><site name="hook" pos="0 0 1"/><body><joint name="elbow" {joint}/>
+  <geom type="capsule" size="0.05" fromto="0 0 0 0.2 0 0"/><site name="hand" pos="0.2 0 0"/></body>
+  </worldbody><tendon><spatial name="cord" {tendon}><site site="hook"/><site site="hand"/></spatial>
+  </tendon><actuator><muscle name="biceps" joint="elbow" {muscle}/></actuator></mujoco>"""
+
+
+def test_a_muscle_without_range_is_explained_with_remedies_that_work(tmp_path: Path) -> None:
+    def given(**more: str) -> Path:
+        text = MUSCLE.format(**{"joint": "", "tendon": "", "muscle": ""} | more)
+        return written(tmp_path, {"arm.xml": text})
+
+    said = (
+        "'biceps' is a muscle, whose force goes by its length between the shortest and the "
+        "longest. MuJoCo looks for these by pulling 'elbow' both ways until it stops"
+    )
+    with pytest.raises(ValueError, match=re.escape(said)):
+        compiled(given())
+    assert compiled(given(joint='range="-60 60"')).nu == 1
+    assert compiled(given(muscle='lengthrange="-1 1"')).nu == 1

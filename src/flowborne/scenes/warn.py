@@ -28,6 +28,7 @@ from flowborne.scenes.warn_bodies import (
     implausible_density,
     lost_in_domain,
     mass_apart,
+    only_to_see,
     thin_bodies,
 )
 from flowborne.scenes.warn_speed import fast_bodies, fast_flow, unlike_the_sea
@@ -136,6 +137,7 @@ WARNINGS: tuple[Warn, ...] = (
     lost_in_domain,
     implausible_density,
     mass_apart,
+    only_to_see,
     bodies_not_met,
     counted_twice,
     pinned_under_lid,

@@ -93,6 +93,18 @@ def check_kind(root: Element, suffix: str) -> None:
         )
 
 
+def links_to_see(robot: Element) -> list[str]:
+    """Links of a URDF that have visual shapes alone, which MuJoCo discards; none of MJCF."""
+    if robot.tag != "robot":
+        return []
+    kept = [c.get("discardvisual") == "false" for c in robot.iterfind("mujoco/compiler")]
+    return [
+        link.get("name", "")
+        for link in robot.iterfind("link")
+        if not any(kept) and link.find("visual") is not None and link.find("collision") is None
+    ]
+
+
 def check_mesh(name: str) -> None:
     """Raise ValueError for a mesh file of a kind that MuJoCo does not read."""
     if name.lower().endswith(".dae"):

@@ -163,10 +163,10 @@ def gathered(path: Path, packages: Sequence[Path] = ()) -> ModelFiles:
 def _name_for_mujoco(path: Path) -> str:
     """The name of a model with the ending by which MuJoCo knows its language: in small letters, and
     no other than these two."""
-    return f"{path.stem}{'.urdf' if parsed(_text_of(path)).tag == 'robot' else '.xml'}"
+    return f"{path.stem}{'.urdf' if parsed(text_of(path)).tag == 'robot' else '.xml'}"
 
 
-def _text_of(path: Path) -> bytes:
+def text_of(path: Path) -> bytes:
     """A model's text, which begins with its XML declaration if it has one."""
     text = read_file(path)
     found = LATE_DECLARATION.match(text)
@@ -275,7 +275,7 @@ class _Gathering:
 def _read(path: Path, folder: Path, read: set[Path]) -> _Part:
     """A text of a model in `folder`; the files in `read` have been read before."""
     read.add(path.resolve())
-    text = _text_of(path)
+    text = text_of(path)
     part = _Part(path, text, [*parsed(text).iter()], {})
     for number, element in enumerate(part.elements):
         file = element.get("file") if element.tag == "include" else None
