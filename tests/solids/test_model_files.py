@@ -175,7 +175,7 @@ def test_packages_are_looked_for_where_the_scene_says(tmp_path: Path) -> None:
         (
             "a.xml",
             "<mujoco><worldbody><body><composite type='cable'/></body></worldbody></mujoco>",
-            "it has a <composite>, which MuJoCo 4 does not have",
+            "a.xml has a <composite>, which MuJoCo 4 does not have. Write its cables as chains",
         ),
         ("a.urdf", URDF.format(mesh="link.DAE", ixx=1, mass=1), "its mesh link.DAE is COLLADA"),
         ("a.xml", "<mujoco><include file='a.xml'/></mujoco>", "includes a.xml once more"),

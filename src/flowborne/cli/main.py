@@ -486,6 +486,24 @@ def import_(
 
 
 @app.command()
+def chains(
+    model: Annotated[
+        Path, typer.Argument(metavar="MODEL.xml", help="Model or part with <composite> cables.")
+    ],
+) -> None:
+    """Write the cables of a model of MuJoCo 3 as chains of capsules, in a copy beside it."""
+    from xml.etree.ElementTree import ParseError
+
+    from flowborne.solids.cables import write_chains
+
+    with _writing(model, ValueError, ParseError):
+        made, notes = write_chains(model)
+    print(f"written: {made}")
+    for note in notes:
+        print(f"  {note}")
+
+
+@app.command()
 def doctor() -> None:
     """Check that this machine has what flowborne needs, and say how to install what is missing."""
     from flowborne.sim.doctor import findings

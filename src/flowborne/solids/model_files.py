@@ -20,7 +20,7 @@ from xml.parsers import expat
 from xml.sax.saxutils import escape
 
 from flowborne.base.given import read_file
-from flowborne.solids.model_checks import check_kind, check_mesh
+from flowborne.solids.model_checks import check_composites, check_kind, check_mesh
 
 ATTRIBUTE = re.compile(rb"\s+([^\s=/>]+)\s*=\s*(\"[^\"]*\"|'[^']*')")
 
@@ -277,6 +277,7 @@ def _read(path: Path, folder: Path, read: set[Path]) -> _Part:
     read.add(path.resolve())
     text = text_of(path)
     part = _Part(path, text, [*parsed(text).iter()], {})
+    check_composites(part.elements[0], path)
     for number, element in enumerate(part.elements):
         file = element.get("file") if element.tag == "include" else None
         if not file:
