@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,9 +13,10 @@ from scipy.spatial.transform import Rotation
 
 import flowborne as fb
 from flowborne.base.colours import to_linear
+from flowborne.characters.division import divided, is_sound
 from flowborne.characters.gltf import GltfSource
 from flowborne.characters.model import as_cycle, posed
-from flowborne.characters.rig import Z_UP, Action, Rig, Surface
+from flowborne.characters.rig import Z_UP, Action, Rig, Surface, heaviest, one_tree
 from flowborne.characters.source import read_source
 from flowborne.cli import main as cli
 from flowborne.formats.creature import Creature
@@ -23,11 +25,13 @@ from flowborne.scenes.bodies import load_model
 from flowborne.scenes.build import build
 from flowborne.scenes.load import check_scene
 from flowborne.scenes.warn_speed import fast_bodies, steps_for_bodies
+from flowborne.shapes.mesh import ShapeMesh
+from flowborne.solids.dynamics import kinematics
 from flowborne.solids.skins import skins_of
 from flowborne.view.run import Run
 
 from ..read_bvh import read_bvh
-from . import rigged
+from . import hands, rigged
 
 CREATURES = Path(__file__).parents[3] / "shared" / "creatures"
 needs_creatures = pytest.mark.skipif(
@@ -317,3 +321,82 @@ def beyond(rig: Rig, name: str) -> set[int]:
         if parent in found:
             found.add(joint)
     return found
+
+
+@pytest.fixture(scope="module")
+def hand(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, tuple[str, ...]]:
+    """The scene of a hand whose 25 joints lie side by side, and the notes of its import."""
+    folder = tmp_path_factory.mktemp("hand")
+    hands.write_hand(folder / "hand.vrm")
+    made = fb.import_character(folder / "hand.vrm", folder / "scene")
+    return made.scene, made.notes
+
+
+def test_joints_side_by_side_hang_on_the_one_with_the_most_weight(
+    hand: tuple[Path, tuple[str, ...]],
+) -> None:
+    """A .vrm file is a .glb by its content; its first joint is a fingertip."""
+    scene, notes = hand
+    assert notes[0].startswith(
+        "its joints have no common root: 24 of 25 without a parent hang on 'wrist', which has the "
+        "most weight; "
+    )
+    solid = load_model(fb.load_scene(scene))
+    names, places = hands.joints()
+    assert names[0] == "pinky-tip"
+    wrist = solid.body("wrist")
+    assert solid.mj.body_parentid[wrist] == 0
+    others = [solid.body(name) for name in names if name != "wrist"]
+    assert (solid.mj.body_parentid[others] == wrist).all()
+    pose = kinematics(solid, solid.rest().q)
+    found = pose.body_position[[solid.body(name) for name in names]]
+    assert_allclose(found, places @ Z_UP.T, atol=1e-7)
+
+
+def test_fingers_of_a_hand_without_chains_curl_as_in_the_file(
+    hand: tuple[Path, tuple[str, ...]],
+) -> None:
+    clip = read_bvh(hand[0].with_suffix(".bvh"))
+    assert clip.names[0] == "wrist"
+    turned = [name for name in clip.names if name.endswith(hands.CURLED)]
+    assert turned
+    _, world = clip.poses()
+    for joint, name in enumerate(clip.names):
+        angle = np.degrees(Rotation.from_quat(world[:, joint], scalar_first=True).magnitude())
+        assert_allclose(np.ptp(angle), hands.CURL if name in turned else 0.0, atol=TURNED)
+
+
+def test_bodies_of_a_hand_have_inertias_that_bodies_can_have(
+    hand: tuple[Path, tuple[str, ...]],
+) -> None:
+    """Where three regions meet, a piece of its own would be no body: it joins its neighbour, and
+    the notes say so. The bodies still have the mass of the whole."""
+    scene, notes = hand
+    mj = load_model(fb.load_scene(scene)).mj
+    heavy = mj.body_mass > 0.0
+    inertia = np.sort(mj.body_inertia[heavy], axis=1)
+    assert (inertia[:, 0] > 0.0).all()
+    assert (inertia[:, 2] < inertia[:, 0] + inertia[:, 1]).all()
+    (said,) = [note for note in notes if note.startswith("joined to their neighbour")]
+    vertices, faces = hands.surface()
+    assert mj.body_mass.sum() == pytest.approx(1000.0 * ShapeMesh(vertices, faces).volume, rel=1e-5)
+    rig, surface = one_hand()
+    joined = said.rpartition(": ")[2].split(", ")
+    division = divided(rig, surface, "hand.vrm")
+    assert [rig.names[joint] for joint in division.unsound] == joined
+    assert all(is_sound(mesh) for mesh in (*division.pieces.values(), *division.shapes.values()))
+
+
+def one_hand() -> tuple[Rig, Surface]:
+    """The skeleton as one tree on the wrist, and the surface, z up."""
+    names, places = hands.joints()
+    vertices, faces = hands.surface()
+    flat = Rig(tuple(names), np.full(25, -1), places @ Z_UP.T, np.tile(Z_UP, (25, 1, 1)))
+    weights = hands.weights(vertices)
+    first = np.argsort(-weights, axis=1)[:, 4:]
+    np.put_along_axis(weights, first, 0.0, axis=1)
+    weights /= weights.sum(axis=1, keepdims=True)
+    grey = np.full((len(faces), 3), 0.5)
+    surface = Surface(vertices @ Z_UP.T, faces, weights, grey)
+    rig, order = one_tree(flat, heaviest(surface))
+    return rig, replace(surface, weights=weights[:, order])

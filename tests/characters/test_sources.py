@@ -96,7 +96,7 @@ def test_what_is_wrong_with_a_file_is_one_message(
     (tmp_path / "cut.usda").write_text("none")
     for name, said in (
         ("cat.fbx", r"cat\.fbx: \.fbx .* Make a \.glb of it, in Blender .*'cat\.glb'"),
-        ("cat.max", r"cat\.max is none of \.glb, \.gltf, \.usd"),
+        ("cat.max", r"cat\.max is none of \.glb, \.gltf, \.vrm, \.usd"),
         ("cat.glb", r"there is no file .*cat\.glb\. Correct its name"),
         ("cut.glb", r"cut\.glb cannot be read as glTF: it has no JSON chunk. Export it again"),
         ("cut.usda", r"cut\.usda cannot be read as USD"),

@@ -3,6 +3,7 @@ import re
 import subprocess
 import sys
 from dataclasses import asdict, dataclass, field
+from time import perf_counter
 from types import ModuleType
 
 import pytest
@@ -192,6 +193,59 @@ def test_check_tells_every_problem_at_once(command, small_scene):
     assert err.count("\n") == 2
     assert "density" in err
     assert "frames" in err
+
+
+def test_check_of_a_large_grid_starts_nothing_and_says_so(command, tmp_path):
+    """16.8 million cells: 160 s where they were cut and the fluid was started on them."""
+    (tmp_path / "box.xml").write_text(
+        '<mujoco><worldbody><body name="box" pos="0.3 0.3 0.3"><freejoint/>'
+        '<geom type="box" size="0.05 0.05 0.05"/></body></worldbody></mujoco>'
+    )
+    (tmp_path / "box.toml").write_text(
+        "[time]\nframes_per_second = 50.0\nframes = 6\n[domain]\nsize = [0.6, 0.6, 0.6]\n"
+        'resolution = 16\n[fluid]\n[solids]\nmodel = "box.xml"\n'
+    )
+    _, out, _ = command("check", "box.toml")
+    assert "not started" not in out
+    began = perf_counter()
+    code, out, _ = command("check", "box.toml", "--set", "domain.resolution=256")
+    assert perf_counter() - began < 10.0
+    assert code == 0
+    assert "  not started, as the grid has more than 4,000,000 cells; a run starts bodies" in out
+    assert "creature: 1 kg, displaces 1 kg of fluid, 0.1 x 0.1 x 0.1 m" in out
+
+
+def test_cables_of_mujoco_3_are_chains_by_the_command_that_the_refusal_names(command, tmp_path):
+    (tmp_path / "rope.xml").write_text(
+        '<mujocoinclude><composite prefix="r" type="cable" curve="s" count="6" size="0.3">'
+        '<geom type="capsule" size="0.02"/></composite></mujocoinclude>'
+    )
+    (tmp_path / "box.xml").write_text(
+        '<mujoco><worldbody><body name="box" pos="0.1 0.3 0.3"><geom size="0.05"/>'
+        '<include file="rope.xml"/></body></worldbody></mujoco>'
+    )
+    (tmp_path / "box.toml").write_text(
+        "[time]\nframes_per_second = 50.0\nframes = 6\n[domain]\nsize = [0.6, 0.6, 0.6]\n"
+        'resolution = 16\n[fluid]\n[solids]\nmodel = "box.xml"\n'
+    )
+    code, _, err = command("check", "box.toml")
+    assert code == 2
+    assert err.count("\n") == 1
+    named = re.search(r"by `flowborne (chains .*rope\.xml)`, and give rope-chains\.xml\.", err)
+    assert named, err
+    code, out, _ = command(*named[1].split(" ", 1))
+    assert code == 0
+    assert "cable 'r': 5 bodies" in out
+    model = (tmp_path / "box.xml").read_text()
+    (tmp_path / "box.xml").write_text(model.replace("rope.xml", "rope-chains.xml"))
+    code, out, err = command("check", "box.toml")
+    assert code == 0, err
+    assert "geoms that displace fluid: all 6" in out
+    code, _, err = command("chains", "box.xml")
+    assert (code, err) == (
+        2,
+        "flowborne: box.xml has no <composite>. Give the file that has one.\n",
+    )
 
 
 def test_check_counts_its_warnings_and_strictly_ends_with_3(command, small_scene):

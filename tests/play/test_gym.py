@@ -56,6 +56,30 @@ def test_environments_are_made_by_name() -> None:
     env.close()
 
 
+def test_render_modes_are_of_the_class(small_scene: Path) -> None:
+    """Gymnasium asks the class before there is an environment; the rate is of the scene."""
+    assert SceneEnv.metadata == {"render_modes": ["rgb_array"]}
+    env = SceneEnv(small_scene)
+    rate = env.scene.time.frames_per_second
+    assert env.metadata == {"render_modes": ["rgb_array"], "render_fps": rate}
+    assert "render_fps" not in SceneEnv.metadata
+    env.close()
+
+
+@pytest.mark.parametrize("action", [0.5, [0.5, 0.5], [[0.5]], []])
+def test_an_action_of_another_shape_is_refused_with_the_right_one(
+    small_scene: Path, action: object
+) -> None:
+    env = SceneEnv(small_scene)
+    env.reset()
+    said = r"an action has the shape \(1,\), a number for each of hinge, and this one \("
+    with pytest.raises(ValueError, match=said):
+        env.step(np.array(action))
+    assert env.simulation.frame == 0
+    env.step([0.5])  # type: ignore[arg-type]
+    env.close()
+
+
 def test_the_same_actions_give_the_same_episode_and_the_scene_ends_it(small_scene: Path) -> None:
     episodes = []
     env = SceneEnv(fb.load_scene(small_scene, {"time.frames": "3"}))

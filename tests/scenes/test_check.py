@@ -548,3 +548,14 @@ def test_load_raises_what_check_lists(write: Write) -> None:
         load_scene(path)
     assert caught.value.problems == check_scene(path)
     assert len(caught.value.problems) == 2
+
+
+@pytest.mark.parametrize(
+    "model", [r"C:\Users\me\fish.xml", r"models\fish.xml", r"..\new\tail.xml", r"\ball.xml"]
+)
+def test_a_windows_path_in_quotes_is_told_to_be_written_with_slashes(
+    tmp_path: Path, model: str
+) -> None:
+    (tmp_path / "swim.toml").write_text(f'[solids]\nmodel = "{model}"\n')
+    (problem, *_) = [p for p in check_scene(tmp_path / "swim.toml") if "\\" in p]
+    assert problem.endswith(" Write paths with / in place of \\, on Windows as well.")

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 
 from flowborne.coupling.world import World
 from flowborne.scenes.build import build
@@ -232,3 +233,33 @@ def test_what_cannot_be_held_is_refused(written: Written) -> None:
     more = 'hold = ["elbow"]\n[[motion]]\nkind = "constant"\njoint = "elbow"\nposition = 30.0\n'
     (problem,) = check_scene(written(more))
     assert "joint 'elbow' has a [[motion]]. Keep one of them." in problem
+
+
+LINK = """<link name="{name}"><inertial><mass value="1"/>
+  <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>
+  <visual><geometry><mesh filename="link.stl"/></geometry></visual></link>"""
+
+ROBOT = f"""<robot name="robot">{{compiler}}{LINK.format(name="base")}{LINK.format(name="tail")}
+  <joint name="hinge" type="revolute"><origin xyz="0 0.3 0"/><parent link="base"/>
+  <child link="tail"/><axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/>
+  </joint></robot>"""
+
+
+@pytest.mark.parametrize("floating", ["", 'floating = ["base"]\n'])
+def test_a_urdf_of_visual_meshes_alone_names_the_cause_and_a_key_that_works(
+    written: Written, tmp_path: Path, floating: str
+) -> None:
+    path = written()
+    path.write_text(SCENE.replace("robot.xml", "robot.urdf") + floating)
+    trimesh.creation.icosphere(2, 0.12).export(tmp_path / "link.stl")
+    (tmp_path / "robot.urdf").write_text(ROBOT.format(compiler=""))
+    (warning,) = [w for w in warnings_of(load_scene(path), world_of(path).setup) if "fluid" in w]
+    assert warning.startswith(
+        "[solids]: base, tail have visual shapes alone, which "
+        "MuJoCo leaves out of a URDF, so that no fluid meets them; "
+    )
+    key = warning.split("; ")[1].split(" within")[0]
+    (tmp_path / "robot.urdf").write_text(ROBOT.format(compiler=key))
+    setup = world_of(path).setup
+    assert not any("fluid" in w for w in warnings_of(load_scene(path), setup))
+    assert setup.solid.ngeom == 2

@@ -44,9 +44,12 @@ def test_a_thin_one_as_thick_as_the_diagonal_of_a_cell(geom: str):
 
 def test_of_several_parts_the_thinnest_counts_and_a_slab_has_no_thickness_across_it():
     slab = Grid.slab(20, 20, 0.05, (-0.5, -0.5))
-    rod, block = '<geom type="sphere" size="0.09"/>', '<geom type="box" size="0.2 0.2 0.001"/>'
+    rod = '<geom type="sphere" size="0.09" pos="0.2 0 0"/>'
+    block = '<geom type="box" size="0.2 0.2 0.001"/>'
     (fin,) = seen_in(slab, rod, block)
     assert fin.thickness == fin.seen == pytest.approx(0.18)
+    (fin,) = seen_in(slab, rod.replace("0.2 0 0", "0.1 0 0"), block)
+    assert fin.thickness == fin.seen == pytest.approx(0.4)  # no fluid meets the rod
 
 
 def mesh_seen_in(grid: Grid, corners: np.ndarray, name: str = "fin") -> Seen:

@@ -175,7 +175,7 @@ def test_packages_are_looked_for_where_the_scene_says(tmp_path: Path) -> None:
         (
             "a.xml",
             "<mujoco><worldbody><body><composite type='cable'/></body></worldbody></mujoco>",
-            "it has a <composite>, which MuJoCo 4 does not have",
+            "a.xml has a <composite>, which MuJoCo 4 does not have. Write its cables as chains",
         ),
         ("a.urdf", URDF.format(mesh="link.DAE", ixx=1, mass=1), "its mesh link.DAE is COLLADA"),
         ("a.xml", "<mujoco><include file='a.xml'/></mujoco>", "includes a.xml once more"),
@@ -211,3 +211,52 @@ def test_an_inertia_that_mujoco_refuses_names_the_body_and_a_remedy_that_works(
     assert remedy in str(raised.value)
     path.write_text(robot.replace("</robot>", f"<mujoco>{remedy}</mujoco></robot>"))
     assert compiled(path).nbody > 1
+
+
+@pytest.mark.parametrize("name", ["arm.URDF", "arm.Urdf", "arm.xml", "arm"])
+@pytest.mark.parametrize("before", ["", "<!-- from a\nsketch -->\n", "\n  "])
+def test_a_urdf_is_known_by_its_content_and_may_begin_with_a_comment(
+    tmp_path: Path, name: str, before: str
+) -> None:
+    robot = URDF.format(mesh="link.STL", ixx=1, mass=1)
+    declared = f"{before}<?xml version='1.0' encoding='utf-8'?>\n{robot}"
+    path = written(tmp_path, {name: declared, "link.STL": STL})
+    mj = compiled(path)
+    assert (mj.nmesh, mj.njnt) == (1, 1)
+    text = gathered(path).texts["arm.urdf"].decode()
+    assert text.startswith("<?xml")
+    assert text.count("\n") == declared.count("\n")
+    copied(gathered(path), tmp_path / "copy")
+
+
+@pytest.mark.parametrize("name", ["ball.MJCF", "ball.XML", "ball.mjcf"])
+def test_mjcf_is_known_by_its_content(tmp_path: Path, name: str) -> None:
+    """As the model of a scene, and as one that another attaches."""
+    ball = "<mujoco><worldbody><body name='ball'><geom size='0.1'/></body></worldbody></mujoco>"
+    whole = (
+        f"<mujoco><asset><model name='ball' file='{name}'/></asset><worldbody>"
+        "<attach model='ball' body='ball' prefix='a_'/></worldbody></mujoco>"
+    )
+    path = written(tmp_path, {"whole.xml": whole, name: ball})
+    assert compiled(path).nbody == compiled(tmp_path / name).nbody == 2
+
+
+MUSCLE = """<mujoco><worldbody><site name="hook" pos="0 0 1"/><body><joint name="elbow" {joint}/>
+  <geom type="capsule" size="0.05" fromto="0 0 0 0.2 0 0"/><site name="hand" pos="0.2 0 0"/></body>
+  </worldbody><tendon><spatial name="cord" {tendon}><site site="hook"/><site site="hand"/></spatial>
+  </tendon><actuator><muscle name="biceps" joint="elbow" {muscle}/></actuator></mujoco>"""
+
+
+def test_a_muscle_without_range_is_explained_with_remedies_that_work(tmp_path: Path) -> None:
+    def given(**more: str) -> Path:
+        text = MUSCLE.format(**{"joint": "", "tendon": "", "muscle": ""} | more)
+        return written(tmp_path, {"arm.xml": text})
+
+    said = (
+        "'biceps' is a muscle, whose force goes by its length between the shortest and the "
+        "longest. MuJoCo looks for these by pulling 'elbow' both ways until it stops"
+    )
+    with pytest.raises(ValueError, match=re.escape(said)):
+        compiled(given())
+    assert compiled(given(joint='range="-60 60"')).nu == 1
+    assert compiled(given(muscle='lengthrange="-1 1"')).nu == 1

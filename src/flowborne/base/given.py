@@ -51,8 +51,17 @@ class FileError(OSError):
         return str(self.strerror)
 
 
+BACKSLASH = "Write paths with / in place of \\, on Windows as well"
+"""What to do where TOML takes a backslash in quotes for the start of a special character."""
+
+SPECIAL = frozenset("\b\t\n\f\r\x1b")
+"""What TOML makes of a backslash and a letter."""
+
+
 def possible_name(value: str) -> str:
     """The name, if a file can have it. Raises ValueError otherwise."""
+    if SPECIAL & set(value):
+        raise ValueError(f"is {value[:60]!r}, with special characters in it. {BACKSLASH}")
     lengths = [len(part.encode()) for part in Path(value).parts]
     if "\0" in value or sum(lengths) > MOST_PATH or max(lengths, default=0) > LONGEST_NAME:
         raise ValueError("is no name that a file can have. Shorten it, without letters of no width")

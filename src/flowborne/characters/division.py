@@ -14,7 +14,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
+from scipy.spatial import ConvexHull, QhullError, cKDTree
 
 from flowborne.base.errors import SceneError
 from flowborne.characters.rig import PLAIN, Rig, Surface
@@ -54,6 +54,7 @@ class Division:
     shapes  the same with domes around the joints
     volume  m^3 inside the whole surface
     filled  width of each closed hole of the surface, m
+    unsound joints that are rigid with a neighbour, as their piece alone is no body (`is_sound`)
     """
 
     owners: Integers
@@ -62,6 +63,7 @@ class Division:
     shapes: dict[int, Mesh]
     volume: float
     filled: tuple[float, ...] = ()
+    unsound: tuple[int, ...] = ()
 
     @property
     def bodies(self) -> tuple[int, ...]:
@@ -85,11 +87,49 @@ def divided(rig: Rig, surface: Surface, name: str, fill: bool = False) -> Divisi
         )
     own, _ = _pieces(rig, np.arange(len(rig.names)), whole, domed=False)
     owners, leader = _merged(rig, np.array([volume_of(piece) for piece in own]) / volume)
-    moves = np.flatnonzero(owners == np.arange(len(owners))).tolist()
-    pieces, shapes = (
-        {joint: meshes[joint] for joint in moves} for meshes in _pieces(rig, owners, whole)
+    unsound: list[int] = []
+    while True:
+        pieces, shapes = _pieces(rig, owners, whole)
+        moves = np.flatnonzero(owners == np.arange(len(owners))).tolist()
+        wrong = [j for j in moves if not (is_sound(pieces[j]) and is_sound(shapes[j]))]
+        if not wrong or len(moves) == 1:
+            break
+        joint, other = _neighbours(rig, owners, wrong[-1], pieces)
+        owners[owners == joint] = other
+        unsound.append(joint)
+    own_pieces, own_shapes = (
+        {joint: meshes[joint] for joint in moves} for meshes in (pieces, shapes)
     )
-    return Division(owners, leader, pieces, shapes, volume, filled)
+    return Division(owners, leader, own_pieces, own_shapes, volume, filled, tuple(unsound))
+
+
+def is_sound(mesh: Mesh) -> bool:
+    """Whether a closed surface can be that of a body: nothing, or a volume whose centre of mass is
+    inside its convex hull, and whose moments of inertia are such as matter has: above 0, and none
+    above the sum of the other two."""
+    import trimesh  # takes a tenth of a second
+
+    if not len(mesh[1]):
+        return True
+    mass = trimesh.triangles.mass_properties(mesh[0][mesh[1]])
+    if not mass.volume > 0.0:
+        return False
+    try:
+        outside = ConvexHull(mesh[0]).equations @ np.append(mass.center_mass, 1.0)
+    except QhullError:  # all points in a plane, but for rounding
+        return False
+    least, middle, most = np.linalg.eigvalsh(mass.inertia)
+    return bool((outside < 0.0).all() and least > 0.0 and most < least + middle)
+
+
+def _neighbours(rig: Rig, owners: Integers, joint: int, pieces: list[Mesh]) -> tuple[int, int]:
+    """The joint that joins another one where the piece of `joint` is no body: it joins its parent;
+    its largest child joins the root."""
+    parents = _parents(rig, owners)
+    if parents[joint] >= 0:
+        return joint, int(parents[joint])
+    below = np.flatnonzero(parents == joint).tolist()
+    return max(below, key=lambda child: volume_of(pieces[child])), joint
 
 
 def closed(surface: Surface, name: str, fill: bool = False) -> tuple[Surface, tuple[float, ...]]:

@@ -13,7 +13,16 @@ from flowborne.base.errors import SceneError
 from flowborne.characters.division import Division, divided
 from flowborne.characters.limits import check_work
 from flowborne.characters.model import as_cycle, clip_of, model_files, posed
-from flowborne.characters.rig import Action, Rig, Surface, printable, scaled, size_notes
+from flowborne.characters.rig import (
+    Action,
+    Rig,
+    Surface,
+    heaviest,
+    one_tree,
+    printable,
+    scaled,
+    size_notes,
+)
 from flowborne.characters.source import clip_number, read_source
 from flowborne.kernels.arrays import Array
 from flowborne.motion.bvh import bvh_text
@@ -102,6 +111,7 @@ def import_character(
     skeleton, action = moving.rig, moving.action(number)
     if animations is None:
         skeleton, action = rig, replace(action, position=scale * action.position)
+    rig, surface, skeleton, action, hung = _as_trees(rig, surface, skeleton, action)
     check_work(len(action.position), len(rig.names), len(surface.vertices), moves.name)
     shared = set(rig.names) & set(skeleton.names)
     if not shared:
@@ -132,12 +142,37 @@ def import_character(
     scene.write_bytes(_scene(name, called, motion, loop, reach, steps).encode())
     left_out = printable(", ".join(source.left_out))
     notes = (
+        *hung,
         *_body_notes(rig, division, density),
         *([f"left out, because they have no weights for joints: {left_out}"] if left_out else []),
         *sizes,
         _clip_note(motion, moving.clips[number], strays),
     )
     return Imported(scene, notes)
+
+
+def _as_trees(
+    rig: Rig, surface: Surface, skeleton: Rig, action: Action
+) -> tuple[Rig, Surface, Rig, Action, list[str]]:
+    """Character and clip with one root each, and a note if the character had several."""
+    roots = [name for name, parent in zip(rig.names, rig.parents, strict=True) if parent < 0]
+    flat = len(roots) > 1
+    main = heaviest(surface) if flat else 0
+    known = rig.names[main] if flat and rig.names[main] in skeleton.names else skeleton.names[0]
+    tree, order = one_tree(rig, main)
+    own, moving = one_tree(skeleton, skeleton.names.index(known))
+    notes = [
+        f"its joints have no common root: {len(roots) - 1} of {len(roots)} without a parent hang "
+        f"on '{rig.names[main]}', which has the most weight; parents in the file make chains of "
+        "them (Blender: Armature, Parent, Make)"
+    ]
+    return (
+        tree,
+        replace(surface, weights=surface.weights[:, order]),
+        own,
+        replace(action, position=action.position[:, moving], rotation=action.rotation[:, moving]),
+        notes if flat else [],
+    )
 
 
 def _plain(stem: str) -> str:
@@ -228,7 +263,11 @@ def _corner(point: Array) -> list[float]:
 
 def _body_notes(rig: Rig, division: Division, density: float) -> Sequence[str]:
     """Notes on joints, bodies and mass."""
-    rigid = [name for n, name in enumerate(rig.names) if division.owners[n] != n]
+    rigid = [
+        name
+        for n, name in enumerate(rig.names)
+        if division.owners[n] != n and n not in division.unsound
+    ]
     lines = [
         f"{len(division.bodies)} bodies of {len(rig.names)} joints, {division.volume:.4g} m^3, "
         f"{density * division.volume:.4g} kg"
@@ -238,6 +277,12 @@ def _body_notes(rig: Rig, division: Division, density: float) -> Sequence[str]:
         lines.append(f"{count} hole{'s' * (count > 1)} closed, the widest {widest:.3g} m across")
     if rigid:
         lines.append(f"rigid with their parent joint: {', '.join(rigid)}")
+    if division.unsound:
+        names = [rig.names[joint] for joint in division.unsound]
+        lines.append(
+            "joined to their neighbour, as the piece between their cuts is no body of its own "
+            f"(inside out, or folded): {', '.join(names)}"
+        )
     return lines
 
 

@@ -26,7 +26,6 @@ from flowborne.characters.rig import (
     frame_times,
     joined,
     normalised,
-    one_tree,
     own_names,
     placed,
     sampled_action,
@@ -101,7 +100,7 @@ class GltfSource:
             inner = self._into_world(skin, binds)
             for node, inverse in zip(skin.joints, binds, strict=True):
                 bind[number[node]] = inner @ np.linalg.inv(inverse)
-        return Rig(names, one_tree(parents), *placed(bind, f"{self._name}, joints at rest"))
+        return Rig(names, np.array(parents), *placed(bind, f"{self._name}, joints at rest"))
 
     @property
     @np.errstate(all="ignore")

@@ -35,8 +35,8 @@ without a unit or with a wrong one: centimetres read as metres make a fox 156 m 
 class Rig:
     """Joints in the pose in which their surface was bound to them.
 
-    names     (n) each once, the root first and parents before children
-    parents   (n,) number of the parent, -1 for the root
+    names     (n) each once, parents before children
+    parents   (n,) number of the parent, -1 for a root; of a tree the first is the only one
     position  (n, 3) m
     rotation  (n, 3, 3) joint's frame to the world's
     """
@@ -174,9 +174,35 @@ def printable(text: str) -> str:
     return "".join(letter if letter.isprintable() else "_" for letter in text)
 
 
-def one_tree(parents: list[int]) -> Integers:
-    """Parents of joints; further roots become children of the first."""
-    return np.array([-1, *(max(parent, 0) for parent in parents[1:])], np.int64)
+def one_tree(rig: Rig, main: int) -> tuple[Rig, Integers]:
+    """A skeleton with one root: further roots hang on the joint `main`.
+
+    returns  the skeleton, and (n,) the number that each of its joints had
+    """
+    if np.count_nonzero(rig.parents < 0) == 1:
+        return rig, np.arange(len(rig.parents))
+    parents, root = rig.parents.copy(), main
+    while parents[root] >= 0:
+        root = int(parents[root])
+    parents[(parents < 0) & (np.arange(len(parents)) != root)] = main
+    order, below = [root], [np.flatnonzero(parents == n) for n in range(len(parents))]
+    for joint in order:
+        order += below[joint].tolist()
+    number = np.array(order)
+    place = np.argsort(number)
+    above = np.where(parents[number] < 0, -1, place[parents[number]])
+    names = tuple(rig.names[joint] for joint in order)
+    return Rig(names, above, rig.position[number], rig.rotation[number]), number
+
+
+def heaviest(surface: Surface) -> int:
+    """The joint with the most weight, by the area of the surface."""
+    corners = surface.vertices[surface.faces]
+    area = np.linalg.norm(
+        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
+    )
+    share = np.bincount(surface.faces.ravel(), np.repeat(area, 3), len(surface.vertices))
+    return int((share @ surface.weights).argmax())
 
 
 def placed(matrices: Array, where: str) -> tuple[Array, Array]:

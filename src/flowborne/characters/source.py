@@ -9,7 +9,7 @@ from flowborne.base.errors import SceneError
 from flowborne.base.extras import optional
 from flowborne.characters.rig import Action, Rig, Surface
 
-GLTF, USD = (".glb", ".gltf"), (".usd", ".usda", ".usdc", ".usdz")
+GLTF, USD = (".glb", ".gltf", ".vrm"), (".usd", ".usda", ".usdc", ".usdz")
 
 BLENDER = (
     'blender --background --python-expr "import bpy; bpy.ops.wm.read_factory_settings('

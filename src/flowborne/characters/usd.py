@@ -30,7 +30,6 @@ from flowborne.characters.rig import (
     frame_times,
     joined,
     normalised,
-    one_tree,
     own_names,
     placed,
     sampled_action,
@@ -110,7 +109,7 @@ class UsdSource:
         )
         parents = [topology.GetParent(joint) for joint in range(len(paths))]
         names = own_names([path.rpartition("/")[2] for path in paths])
-        return Rig(names, one_tree(parents), *placed(bind, f"{self._name}, joints at rest"))
+        return Rig(names, np.array(parents), *placed(bind, f"{self._name}, joints at rest"))
 
     @property
     @_reading

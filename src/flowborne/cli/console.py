@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from math import prod
 from typing import TYPE_CHECKING
 
 from flowborne.base.phrases import listed
@@ -16,6 +17,16 @@ if TYPE_CHECKING:
 
 LONGEST = 1000
 """Letters of a message, of which more are left out in its middle."""
+
+
+MOST_STARTED = 4_000_000
+"""Cells of the largest grid that `check` cuts and on which it starts bodies and fluid: that takes
+some seconds and 2 GB."""
+
+
+def is_started(setup: Setup) -> bool:
+    """Whether `check` starts the bodies and the fluid of a scene."""
+    return setup.fluid is None or prod(setup.fluid.grid.shape) <= MOST_STARTED
 
 
 def run_lines(result: RunResult) -> str:
@@ -57,11 +68,17 @@ def check_lines(scene: Scene, setup: Setup, warnings: list[str]) -> str:
     from flowborne.scenes.seen import seen_bodies
     from flowborne.scenes.warn import headline
 
-    creature = creature_of(scene, setup)
+    started = is_started(setup)
+    creature = creature_of(scene, setup, on_grid=started)
+    later = (
+        f"  not started, as the grid has more than {MOST_STARTED:,} cells; a run starts bodies and "
+        "fluid first"
+    )
     return "\n".join(
         [
             *([] if creature is None else creature.lines()),
             headline(warnings),
+            *([] if started else [later]),
             *(f"  warning: {warning}" for warning in warnings),
             *(f"  {note}" for note in notes_of(scene, setup.solid)),
             *(f"  {seen.sentence()}" for seen in seen_bodies(setup)),

@@ -25,7 +25,14 @@ from typer.core import TyperGroup
 from flowborne.base.errors import PartError, SceneError, fault_of
 from flowborne.base.extras import check_drawing, missing_to_draw, optional
 from flowborne.base.version import __version__
-from flowborne.cli.console import batch_lines, check_lines, complain, run_lines, sentence_of
+from flowborne.cli.console import (
+    batch_lines,
+    check_lines,
+    complain,
+    is_started,
+    run_lines,
+    sentence_of,
+)
 from flowborne.runs.run_folder import RunFolder, RunFolderError, cannot_write
 
 log = logging.getLogger("flowborne")
@@ -314,8 +321,8 @@ def check(
     """Describe the creature, list everything that is wrong or implausible in a scene, and say how
     the grid resolves its bodies.
 
-    Bodies and fluid are started as in a run. A warning does not stop a run; it names a suitable
-    value.
+    Bodies and fluid are started as in a run, on grids of up to 4 million cells. A warning does not
+    stop a run; it names a suitable value.
     """
     from flowborne.scenes.load import load_scene
     from flowborne.scenes.warn import warnings_of
@@ -325,7 +332,9 @@ def check(
         from flowborne.sim.simulation import Simulation
 
         with Simulation(loaded, workers=1) as simulation:
-            setup = simulation.world.setup
+            setup = simulation.setup
+            if is_started(setup):
+                simulation.snapshot()
     found = warnings_of(loaded, setup)
     print(check_lines(loaded, setup, found))
     if strict and found:
@@ -473,6 +482,24 @@ def import_(
         )
     print(f"written: {made.scene}")
     for note in made.notes:
+        print(f"  {note}")
+
+
+@app.command()
+def chains(
+    model: Annotated[
+        Path, typer.Argument(metavar="MODEL.xml", help="Model or part with <composite> cables.")
+    ],
+) -> None:
+    """Write the cables of a model of MuJoCo 3 as chains of capsules, in a copy beside it."""
+    from xml.etree.ElementTree import ParseError
+
+    from flowborne.solids.cables import write_chains
+
+    with _writing(model, ValueError, ParseError):
+        made, notes = write_chains(model)
+    print(f"written: {made}")
+    for note in notes:
         print(f"  {note}")
 
 

@@ -21,7 +21,7 @@ import numpy as np
 
 from flowborne.base.errors import SceneError
 from flowborne.base.extras import optional
-from flowborne.base.phrases import suggestion
+from flowborne.base.phrases import listed, suggestion
 from flowborne.control.commands import (
     Command,
     Control,
@@ -91,6 +91,8 @@ class SceneEnv(gymnasium.Env):  # type: ignore[name-defined]
     observed    names of the numbers of an observation
     """
 
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"]}  # noqa: RUF012, as Gymnasium has it
+
     def __init__(
         self,
         scene: Scene | str | Path,
@@ -118,7 +120,7 @@ class SceneEnv(gymnasium.Env):  # type: ignore[name-defined]
         self.observed = tuple(self._observed())
         self._start = self.simulation.snapshot()
         rate = self.scene.time.frames_per_second / every
-        self.metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": rate}
+        self.metadata = {**self.metadata, "render_fps": rate}
         box, inf = gymnasium.spaces.Box, np.inf
         self.action_space = box(-1.0, 1.0, self._low.shape, np.float32)
         self.observation_space = box(-inf, inf, self._observation().shape, np.float32)
@@ -134,7 +136,17 @@ class SceneEnv(gymnasium.Env):  # type: ignore[name-defined]
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
         """Tell the joints, for `every` frames. `terminated` says that the run broke down, for the
-        cause in the info; `truncated` that the scene is at its end."""
+        cause in the info; `truncated` that the scene is at its end.
+
+        raises  ValueError for an action of another shape
+        """
+        if np.shape(action) != self._low.shape:
+            model = self.simulation.setup.solid
+            dofs = [model.dof_names[dof] for j in self._joints for dof in model.dofs_of(j)]
+            raise ValueError(
+                f"an action has the shape {self._low.shape}, a number for each of {listed(dofs)}, "
+                f"and this one {np.shape(action)}. Give it that shape."
+            )
         simulation, rewards, info = self.simulation, list[float](), dict[str, Any]()
         terminated = False
         try:

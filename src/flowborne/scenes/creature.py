@@ -12,10 +12,14 @@ from flowborne.coupling.world import Setup
 from flowborne.kernels.arrays import Array, Integers, Mask
 from flowborne.scenes.bodies import initial_state
 from flowborne.scenes.schema import Scene
+from flowborne.shapes.mesh import ShapeMesh
 from flowborne.solids.dynamics import kinematics
 from flowborne.solids.geoms import solid_geoms
 from flowborne.solids.model import SolidModel
 from flowborne.solids.surfaces import Outline
+
+GRID_ERROR = 0.02
+"""Part of the displaced mass by which the grid may be off before the lines say so."""
 
 
 @dataclass(frozen=True)
@@ -23,7 +27,10 @@ class Creature:
     """All that moves at the start of a run; all bodies where nothing does.
 
     mass              kg; kg/m in a slab
-    displaced_mass    kg of fluid that it displaces on the grid; None without two-way coupling
+    displaced_mass    kg of fluid in its place, by which buoyancy acts: exact, whatever the grid is;
+                      None without two-way coupling, or if it is of the world itself
+    displaced_on_grid
+                      kg of fluid that the cells lack, by which the flow goes; None if not asked for
     size              (3,) extent along x, y and z, m; (2,) in a slab
     geoms             number of geoms with a volume
     displacing_geoms  number of them that displace fluid
@@ -33,6 +40,7 @@ class Creature:
 
     mass: float
     displaced_mass: float | None
+    displaced_on_grid: float | None
     size: tuple[float, ...]
     geoms: int
     displacing_geoms: int
@@ -43,11 +51,12 @@ class Creature:
         """Three for people."""
         unit = "kg/m" if len(self.size) == 2 else "kg"
         size = " x ".join(f"{length:.3g}" for length in self.size)
-        fluid = (
-            ""
-            if self.displaced_mass is None
-            else f", displaces {self.displaced_mass:.3g} {unit} of fluid"
-        )
+        fluid = ""
+        exact, cells = self.displaced_mass, self.displaced_on_grid
+        if exact is not None:
+            fluid = f", displaces {exact:.3g} {unit} of fluid"
+            if cells is not None and abs(cells - exact) > GRID_ERROR * exact:
+                fluid += f" ({cells:.3g} {unit} on the grid)"
         without = listed(self.unmet) if self.unmet else "none"
         chosen = f"{self.displacing_geoms} of {self.geoms}, {self.rule}"
         if self.displacing_geoms == self.geoms:
@@ -59,8 +68,11 @@ class Creature:
         ]
 
 
-def creature_of(scene: Scene, setup: Setup) -> Creature | None:
-    """The creature of a scene, None without bodies."""
+def creature_of(scene: Scene, setup: Setup, *, on_grid: bool = True) -> Creature | None:
+    """The creature of a scene, None without bodies.
+
+    on_grid  whether to cut the grid for `displaced_on_grid`
+    """
     model = setup.solid
     if not scene.has_bodies:
         return None
@@ -70,7 +82,8 @@ def creature_of(scene: Scene, setup: Setup) -> Creature | None:
         rule = "those of [solids] displace"
     return Creature(
         float(model.body_mass[counted].sum()),
-        _displaced(setup, start, counted),
+        displaced_mass(setup, counted),
+        _displaced_on_grid(setup, start, counted) if on_grid else None,
         tuple(creature_extent(scene, setup).tolist()),
         len(solid_geoms(model.mj)),
         model.ngeom,
@@ -90,8 +103,21 @@ def unmet_bodies(model: SolidModel) -> Integers:
     return np.flatnonzero(model.moving & ~model.met)
 
 
-def _displaced(setup: Setup, start: Array, counted: Mask) -> float | None:
-    """kg of fluid in place of the counted bodies and of flesh, in the cells nearest to them."""
+def displaced_mass(setup: Setup, counted: Mask) -> float | None:
+    """kg of fluid in place of the counted bodies and of flesh, as in `buoyancy_wrench` and
+    `hydrostatic_push`; None without two-way coupling, and where geoms of the world are among them,
+    on which no buoyancy is computed."""
+    model, fluid = setup.solid, setup.fluid
+    if fluid is None or fluid.one_way or (counted[0] and model.met[0]):
+        return None
+    volume = float(model.volume[counted[: model.nbody]].sum())
+    if model.flesh is not None:
+        volume += ShapeMesh(model.flesh.rest, model.flesh.surface).volume
+    return fluid.density * volume
+
+
+def _displaced_on_grid(setup: Setup, start: Array, counted: Mask) -> float | None:
+    """The same in the cells nearest to these bodies."""
     fluid = setup.fluid
     if fluid is None or fluid.one_way:
         return None

@@ -14,7 +14,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from flowborne.base.errors import SceneError
-from flowborne.base.given import read_file
+from flowborne.base.given import BACKSLASH, read_file
 from flowborne.base.phrases import suggestion
 from flowborne.motion.human.skeleton import SIDES
 from flowborne.runs.run_folder import reading
@@ -210,8 +210,10 @@ def find(name_or_path: str | Path) -> Path:
 
 def read_tables(path: Path, kind: str = "scene") -> dict[str, Any]:
     """Tables of a TOML file, which messages call `kind`. Raises SceneError where it is none."""
+    content = ""
     try:
-        return tomllib.loads(read_file(path).decode("utf-8-sig"))
+        content = read_file(path).decode("utf-8-sig")
+        return tomllib.loads(content)
     except OSError as error:
         raise SceneError(f"{kind} {path} cannot be read: {error.strerror}. Mend that.") from None
     except UnicodeDecodeError as error:
@@ -223,9 +225,11 @@ def read_tables(path: Path, kind: str = "scene") -> dict[str, Any]:
         found = re.fullmatch(r"(.*) \(at (?:line (\d+), column (\d+)|end of document)\)", text)
         what, line, column = found.groups() if found else (text, None, None)
         where = f", line {line}, column {column}" if line else ", at its end" if found else ""
+        remedy = "Correct it there."
+        if line and re.search(r'".*\\', content.split("\n")[int(line) - 1]):
+            remedy = f"{BACKSLASH}."
         raise SceneError(
-            f"{kind} {path.name}{where}: this is not TOML ({what[:1].lower() + what[1:]}). "
-            "Correct it there."
+            f"{kind} {path.name}{where}: this is not TOML ({what[:1].lower() + what[1:]}). {remedy}"
         ) from None
     except ValueError:
         raise SceneError(

@@ -17,6 +17,7 @@ from flowborne.coupling.shapes import WATERTIGHT, own_shape, seen_shape
 from flowborne.coupling.world import Setup
 from flowborne.fluid.grid import Grid
 from flowborne.shapes.thickness import sides, thin_parts
+from flowborne.solids.enclosed import hidden_geoms
 from flowborne.solids.model import SolidModel
 
 FEW = 3.0
@@ -89,8 +90,8 @@ def _together(parts: list[Seen]) -> Seen:
 
 
 def _bones(model: SolidModel, grid: Grid) -> Iterator[Seen]:
-    """Every geometry that flesh does not cover."""
-    for geom in map(int, np.flatnonzero(~model.geom_covered)):
+    """Every geometry that the fluid meets."""
+    for geom in map(int, np.flatnonzero(~hidden_geoms(model))):
         own, seen = own_shape(model, geom, grid), seen_shape(model, geom, grid)
         shape = seen.section(*model.rest_pose(geom)) if grid.is_slab else seen
         tips = shape.tips(grid.spacing)

@@ -29,10 +29,12 @@ from flowborne.scenes.warn_bodies import (
     implausible_density,
     lost_in_domain,
     mass_apart,
+    only_to_see,
     thin_bodies,
 )
 from flowborne.scenes.warn_speed import fast_bodies, fast_flow, unlike_the_sea
 from flowborne.scenes.warn_stops import past_stops, soft_stops
+from flowborne.scenes.warn_trim import counted_twice, pinned_under_lid
 from flowborne.solids.model import SLIDE, joint_kind, joint_unit
 
 LEAST_STRENGTH = 2.0 * math.pi
@@ -152,7 +154,10 @@ WARNINGS: tuple[Warn, ...] = (
     lost_in_domain,
     implausible_density,
     mass_apart,
+    only_to_see,
     bodies_not_met,
+    counted_twice,
+    pinned_under_lid,
     floors_in_fluid,
     fixed_outside,
     fast_bodies,

@@ -10,12 +10,15 @@ import numpy as np
 from flowborne.base.phrases import and_more, listed, rounded_down, rounded_up
 from flowborne.coupling.world import Fluid, Setup
 from flowborne.scenes.bodies import initial_state
-from flowborne.scenes.creature import counted_bodies, creature_extent, unmet_bodies
+from flowborne.scenes.creature import counted_bodies, creature_extent, displaced_mass, unmet_bodies
 from flowborne.scenes.domain import Domain, fits_memory
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.seen import Seen, seen_bodies
+from flowborne.solids.enclosed import enclosing_geoms
 from flowborne.solids.geoms import floors, geom_name, kind_of, rest_poses
 from flowborne.solids.model import SolidModel
+from flowborne.solids.model_checks import links_to_see
+from flowborne.solids.model_files import parsed, text_of
 from flowborne.solids.surfaces import geom_boxes
 
 LEAST_CELLS = 2.0
@@ -165,14 +168,11 @@ def mass_apart(scene: Scene, setup: Setup) -> Iterator[str]:
     model, fluid = setup.solid, setup.fluid
     if fluid is None or fluid.one_way or is_gas(fluid) or any(implausible_density(scene, setup)):
         return
-    moving = model.moving
-    mass, displaced = model.body_mass[: model.nbody][moving].sum(), model.volume[moving].sum()
-    if model.flesh is not None:
-        mass += model.body_mass[model.nbody :].sum()
-        displaced += model.flesh.volumes.sum()
-    if not displaced:
+    counted = counted_bodies(model)
+    mass, displaced = model.body_mass[counted].sum(), displaced_mass(setup, counted)
+    if not (displaced and model.moving.any()):
         return
-    times = float(mass / (fluid.density * displaced))
+    times = float(mass / displaced)
     if LIGHT <= times <= HEAVY:
         return
     yield (
@@ -194,11 +194,40 @@ LEAST_MASS = 0.01
 the mass is less than a force of the fluid is right to on the grids that films have."""
 
 
+def only_to_see(scene: Scene, setup: Setup) -> Iterator[str]:
+    """Links of a URDF that only have visual shapes, and so displace nothing."""
+    links = _only_to_see(scene, setup)
+    if links:
+        have = "has" if len(links) == 1 else "have"
+        yield (
+            f"[solids]: {listed(links)} {have} visual shapes alone, which MuJoCo leaves out of a "
+            "URDF, so that no fluid meets them; "
+            '<mujoco><compiler discardvisual="false"/></mujoco> within its <robot> keeps them'
+        )
+
+
+def _only_to_see(scene: Scene, setup: Setup) -> list[str]:
+    """Links that `only_to_see` names: those that move, and all where nothing displaces fluid."""
+    if setup.fluid is None or scene.model_path is None:
+        return []
+    model = setup.solid
+    unmet = {model.body_names[body] for body in unmet_bodies(model)}
+    links = links_to_see(parsed(text_of(scene.model_path)))
+    return [link for link in links if link in unmet or not model.ngeom]
+
+
 def bodies_not_met(scene: Scene, setup: Setup) -> Iterator[str]:
-    """Moving bodies that displace no fluid, though they have geoms that could, or mass."""
+    """Moving bodies that displace no fluid, though they have geoms that could, or mass.
+
+    Ballast inside a hull is none of them.
+    """
     if setup.fluid is None:
         return
     model, unmet = setup.solid, unmet_bodies(setup.solid)
+    outside = model.mj.geom_bodyid[enclosing_geoms(model) < 0]
+    unmet = unmet[(model.mj.body_geomnum[unmet] == 0) | np.isin(unmet, outside)]
+    seen = _only_to_see(scene, setup)
+    unmet = unmet[[model.body_names[body] not in seen for body in unmet]]
     bare = model.mj.body_geomnum[unmet] == 0
     whole = model.body_mass[counted_bodies(model)].sum()
     named = unmet

@@ -169,12 +169,25 @@ def _refusal(spec: MjSpec, where: str, error: ValueError) -> ValueError:
     spec   of the model, not changed
     where  name of the model
     """
+    muscle = re.search(r"Lengthrange computation did not converge in actuator (\d+)", str(error))
+    if muscle is not None:
+        return ValueError(f"{where}: {_without_range(spec.actuators[int(muscle[1])])}")
     found = re.search(r"Error: (.*inertia.*?)\s*Element name '([^']*)'", str(error), re.DOTALL)
     if found is None:
         return _unreadable(where, error)
     why = re.sub(r"; use .*|error '|' in fullinertia", "", found[1].strip())
     return ValueError(
         f"{where}: MuJoCo refuses the inertia of body '{found[2]}' ({why}). {_remedy(spec)}"
+    )
+
+
+def _without_range(muscle: mujoco.MjsActuator) -> str:
+    """Sentences about a muscle whose length has no ends."""
+    return (
+        f"'{muscle.name}' is a muscle, whose force goes by its length between the shortest and the "
+        f"longest. MuJoCo looks for these by pulling '{muscle.target}' both ways until it stops, "
+        "and nothing stops it. Give the joints or the tendon that it pulls a range, or the muscle "
+        'its own lengthrange="shortest longest".'
     )
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from math import prod
+from pathlib import Path
 from xml.etree.ElementTree import Element
 
 import mujoco
@@ -86,11 +87,27 @@ def check_kind(root: Element, suffix: str) -> None:
             f"its root is <{root.tag}>, and that of MJCF is <mujoco>, that of URDF <robot>. "
             "Give a model."
         )
+
+
+def check_composites(root: Element, path: Path) -> None:
+    """Raise ValueError for a text of a model that has one of MuJoCo 3's composites."""
     if root.find(".//composite") is not None:
         raise ValueError(
-            "it has a <composite>, which MuJoCo 4 does not have. Load it in MuJoCo 3, save it by "
-            "`mujoco.mj_saveLastXML`, which writes the bodies themselves, and give that."
+            f"{path.name} has a <composite>, which MuJoCo 4 does not have. Write its cables as "
+            f"chains of capsules by `flowborne chains {path}`, and give {path.stem}-chains.xml."
         )
+
+
+def links_to_see(robot: Element) -> list[str]:
+    """Links of a URDF that have visual shapes alone, which MuJoCo discards; none of MJCF."""
+    if robot.tag != "robot":
+        return []
+    kept = [c.get("discardvisual") == "false" for c in robot.iterfind("mujoco/compiler")]
+    return [
+        link.get("name", "")
+        for link in robot.iterfind("link")
+        if not any(kept) and link.find("visual") is not None and link.find("collision") is None
+    ]
 
 
 def check_mesh(name: str) -> None:

@@ -20,7 +20,7 @@ from xml.parsers import expat
 from xml.sax.saxutils import escape
 
 from flowborne.base.given import read_file
-from flowborne.solids.model_checks import check_kind, check_mesh
+from flowborne.solids.model_checks import check_composites, check_kind, check_mesh
 
 ATTRIBUTE = re.compile(rb"\s+([^\s=/>]+)\s*=\s*(\"[^\"]*\"|'[^']*')")
 
@@ -44,6 +44,9 @@ FOLDER_KEYS = {
 """Element that names a file -> compiler attributes that give its folder."""
 
 FOLDERS = ("assetdir", "meshdir", "texturedir")
+
+LATE_DECLARATION = re.compile(rb"((?:\s|<!--.*?-->)+)(<\?xml\s[^>]*\?>)", re.DOTALL)
+"""Blanks and comments, and an XML declaration after them, which XML has at the start."""
 
 MOST_NESTED = 500
 """Deepest nesting of elements; readers and writers recurse once per level."""
@@ -152,9 +155,25 @@ def gathered(path: Path, packages: Sequence[Path] = ()) -> ModelFiles:
     raises    OSError for a file that cannot be read, ElementTree.ParseError for a text that is not
               XML, ValueError for a file that MuJoCo does not read
     """
-    files = ModelFiles(path.name)
-    _Gathering(files, packages).add_model(path, path.name)
+    files = ModelFiles(_name_for_mujoco(path))
+    _Gathering(files, packages).add_model(path, files.name)
     return files
+
+
+def _name_for_mujoco(path: Path) -> str:
+    """The name of a model with the ending by which MuJoCo knows its language: in small letters, and
+    no other than these two."""
+    return f"{path.stem}{'.urdf' if parsed(text_of(path)).tag == 'robot' else '.xml'}"
+
+
+def text_of(path: Path) -> bytes:
+    """A model's text, which begins with its XML declaration if it has one."""
+    text = read_file(path)
+    found = LATE_DECLARATION.match(text)
+    if found is None:
+        return text
+    before, declaration = found.groups()
+    return declaration + before + text[found.end() :]
 
 
 @dataclass
@@ -203,13 +222,15 @@ class _Gathering:
             element = part.elements[number]
             if element.tag == "include":
                 inside = part.included[number]
-                target, new = self._named(inside.path, folder)
+                target, new = self._named(inside.path, folder, inside.path.name)
                 if new:
                     self._add_part(inside, target, folder, model, given)
             else:
                 source = self._source(element, key, model, given)
-                target, new = self._named(source, "")
-                if new and element.tag == "model":
+                model_of_its_own = element.tag == "model"
+                called = _name_for_mujoco(source) if model_of_its_own else source.name
+                target, new = self._named(source, "", called)
+                if new and model_of_its_own:
                     self.add_model(source, target)
                 elif new:
                     self._files.assets[target] = read_file(source)
@@ -232,19 +253,20 @@ class _Gathering:
         keys = FOLDER_KEYS[element.tag]
         return model.parent / next((given[key] for key in keys if key in given), "") / file
 
-    def _named(self, source: Path, folder: str) -> tuple[str, bool]:
+    def _named(self, source: Path, folder: str, called: str) -> tuple[str, bool]:
         """The name of a file in the gathered model, and whether the file is new.
 
         folder  folder to which names in the file are relative
+        called  its own name there, if it is not taken
         """
         known = source.resolve(), source.name, folder
         if known in self._names:
             return self._names[known], False
         taken = {name.casefold() for name in self._names.values()}
-        name, number = f"{ASSETS}/{source.name}", 1
+        name, number = f"{ASSETS}/{called}", 1
         while name.casefold() in taken:
             number += 1
-            name = f"{ASSETS}/{number}/{source.name}"
+            name = f"{ASSETS}/{number}/{called}"
         self._names[known] = name
         self._files.sources[name] = source
         return name, True
@@ -253,8 +275,9 @@ class _Gathering:
 def _read(path: Path, folder: Path, read: set[Path]) -> _Part:
     """A text of a model in `folder`; the files in `read` have been read before."""
     read.add(path.resolve())
-    text = read_file(path)
+    text = text_of(path)
     part = _Part(path, text, [*parsed(text).iter()], {})
+    check_composites(part.elements[0], path)
     for number, element in enumerate(part.elements):
         file = element.get("file") if element.tag == "include" else None
         if not file:
