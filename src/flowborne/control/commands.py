@@ -14,6 +14,7 @@ from flowborne.control.creature import within_range
 from flowborne.coupling.world import Setup, World
 from flowborne.kernels.arrays import Array, Integers
 from flowborne.solids.actuators import actuators
+from flowborne.solids.force import Force, check_force
 from flowborne.solids.model import FREE, SolidModel
 from flowborne.solids.trajectories import (
     Servo,
@@ -77,7 +78,7 @@ class Control:
     value: float
 
 
-Command = Position | Velocity | Torque | Control
+Command = Position | Velocity | Torque | Control | Force
 Commands = Mapping[str, Command]
 
 Drives = Sequence[tuple[Integers, Servo]]
@@ -87,19 +88,25 @@ Drives = Sequence[tuple[Integers, Servo]]
 def told_by(
     commands: Commands, world: World, span: float, drives: Drives
 ) -> tuple[Told, tuple[str, ...]]:
-    """What joints are told by commands, and which of their limits these would have passed.
+    """What joints and bodies are told by commands, and which limits these would have passed.
 
     A joint keeps within its range, and moves as its drive can: exactly, by a PD law, or with a
     limited torque, which limits a told torque too.
 
-    commands  by the names of joints, or of actuators for Control
+    commands  by the names of joints, or of actuators for Control; a Force has a name of its own
     span      s, length of the frame
     drives    of the scene itself
-    raises    SceneError for a joint that is unknown or cannot be driven, and for wrong numbers
+    raises    SceneError for a joint or body that is unknown or cannot be driven, and for wrong
+              numbers
     """
     model, motions, beyond = world.setup.solid, list[Trajectory](), list[str]()
+    forces = {name: given for name, given in commands.items() if isinstance(given, Force)}
+    for name, pushing in forces.items():
+        check_force(pushing, model, name)
     pushed, force = [np.zeros(0, np.int64)], [np.zeros(0)]
     for name, given in commands.items():
+        if isinstance(given, Force):
+            continue
         joint, command, own = _actuated(model, name, given)
         dofs = _driven_dofs(model, joint)
         servo = servo_of(dofs, drives) if own is None else own
@@ -119,9 +126,10 @@ def told_by(
         else:
             raise SceneError(
                 f"the command to '{joint}' is {command!r:.60}: "
-                "give a Position, a Velocity, a Torque or a Control"
+                "give a Position, a Velocity, a Torque, a Control or a Force"
             )
-    return Told(tuple(motions), np.concatenate(pushed), np.concatenate(force)), tuple(beyond)
+    joints = tuple(motions), np.concatenate(pushed), np.concatenate(force)
+    return Told(*joints, tuple(forces.values())), tuple(beyond)
 
 
 def _actuated(model: SolidModel, name: str, command: Command) -> tuple[str, Command, Servo | None]:

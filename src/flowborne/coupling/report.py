@@ -122,10 +122,11 @@ class StepReport:
     viscous_wrench   (nbody, 6) the same of the shear stress
     buoyancy_wrench  (nbody, 6) the same of the hydrostatic pressure (Archimedes)
     wind_wrench      (nbody, 6) the same of the simple winds
+    applied_wrench   (nbody, 6) the same of forces from outside, which is none of the fluid's
     jet_wrench       (nbody, 6) the same of the reaction of what mouths expel
     added_mass       of which `added_mass_wrench` is made
-    centre           (nbody, 3) centres of mass at the end of the step, m; 0 where neither a fluid
-                     nor a wind acts
+    centre           (nbody, 3) centres of mass at the end of the step, m; 0 where no fluid, wind or
+                     force acts
     work             of the drives, J
     momentum_solid   of the bodies half a step on, which keeps what it is given exactly
                      (see solids.momentum.halfway_momentum)
@@ -170,6 +171,7 @@ class StepReport:
     viscous_wrench: Mean
     buoyancy_wrench: Mean
     wind_wrench: Mean
+    applied_wrench: Mean
     jet_wrench: Mean
     added_mass: Annotated[Asked, Joined(in_turn)]
     centre: Mean
@@ -210,6 +212,10 @@ class StepReport:
     def central_wrench(self) -> Array:
         """(nbody, 6) `fluid_wrench` about each body's centre of mass."""
         return about(self.fluid_wrench(), self.centre)
+
+    def central_applied(self) -> Array:
+        """(nbody, 6) `applied_wrench` about each body's centre of mass."""
+        return about(self.applied_wrench, self.centre)
 
     def central_added_mass(self) -> Array:
         """(nbody, 6) `added_mass_wrench` about each body's centre of mass."""

@@ -14,7 +14,7 @@ from flowborne.coupling.mouths import Jet, jet_wrench
 from flowborne.coupling.operators import buoyancy_wrench
 from flowborne.coupling.report import FIELDS, Asked, Outcome, StepReport
 from flowborne.coupling.solve import Solved, SolvedFlow
-from flowborne.coupling.stream import winds_on
+from flowborne.coupling.stream import forces_on, winds_on
 from flowborne.coupling.world import World
 from flowborne.fluid.control_volumes import momentum_changes
 from flowborne.kernels.arrays import Array
@@ -74,9 +74,9 @@ def report_bodies(world: World, dt: float, solved: Solved, known: dict[str, Any]
 def known_forces(
     world: World, pose: Kinematics, half: Array, jets: tuple[Jet, ...], dt: float
 ) -> tuple[Array, dict[str, Any]]:
-    """(k,) force on the bodies that is known before the solve, N and N m: of winds, of jets, of the
-    hydrostatic pressure, and of half of the last pressure with the impulse `half` (k,); and what
-    the report says of it."""
+    """(k,) force on the bodies that is known before the solve, N and N m: of winds, of forces from
+    outside at the end of the step, of jets, of the hydrostatic pressure, and of half of the last
+    pressure with the impulse `half` (k,); and what the report says of it."""
     model, density = world.setup.solid, world.flow()[0].density
     buoyancy = buoyancy_wrench(pose.centroid, model.volume, model.gravity, density).ravel()
     if model.flesh is not None:
@@ -85,10 +85,12 @@ def known_forces(
         buoyancy = np.append(buoyancy, pressed)
     wind, jet = winds_on(world, pose), jet_wrench(jets, density, model.nbody)
     push = buoyancy + half / dt
-    push[: 6 * model.nbody] += (wind + jet).ravel()
+    applied = forces_on(world, pose, world.time + dt)
+    push[: 6 * model.nbody] += (wind + applied + jet).ravel()
     return push, {
         "buoyancy_wrench": on_bodies(pose, model.flesh, buoyancy),
         "wind_wrench": wind,
+        "applied_wrench": applied,
         "jet_wrench": jet,
         "expelled": dt * sum(jet.rate for jet in jets),
     }

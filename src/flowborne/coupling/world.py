@@ -22,6 +22,7 @@ from flowborne.fluid.wake import wake_shape
 from flowborne.fluid.window import Window, crosses
 from flowborne.kernels.arrays import Array
 from flowborne.solids.dynamics import Kinematics
+from flowborne.solids.force import Force
 from flowborne.solids.model import SolidModel, SolidState
 from flowborne.solids.prescribed import PrescribedSystem
 from flowborne.solids.trajectories import NOTHING_TOLD, Told, Trajectory
@@ -77,6 +78,7 @@ class Setup:
     fluid    the fluid, or None (simple wind and gravity only)
     motions  prescribed motions of some dofs
     winds    simple winds (paper eq. 2, or a uniform force)
+    forces   on single bodies, from outside
     mouths   patches of skin through which fluid is expelled; needs a fluid that is not one-way
     trial    whether steps are hypothetical, and may be longer than those of the world itself
     balances whether steps report momenta, divergence, the fastest flow and the added-mass part of
@@ -90,6 +92,7 @@ class Setup:
     fluid: Fluid | None = None
     motions: tuple[Trajectory, ...] = ()
     winds: tuple[Wind, ...] = ()
+    forces: tuple[Force, ...] = ()
     mouths: tuple[Mouth, ...] = ()
     trial: bool = False
     balances: bool = True
@@ -143,7 +146,7 @@ class World:
     ahead   s by which v is ahead of the positions: half of the last part of a step of its own
     parts   most parts that a step of the world itself has been divided into, see `bodies_step`
     memory  the controller's own arrays, by name
-    told    what joints are told from outside in this frame: not part of the state
+    told    what joints and bodies are told from outside in this frame: not part of the state
     cut     the positions (nq,) for which the grid was cut last, the bodies there, and that cut:
             made from the state, and not part of it
     volumes the cut that the last step ended with, and its control volumes; likewise

@@ -90,7 +90,8 @@ def build(scene: Scene, executor: Mapper | None = None) -> Built:
     start = initial_state(scene, model)
     winds, controller = _acting(scene, model, executor or Serial())
     fluid = with_window(fluid_of(scene), scene, model, start.q)
-    setup = Setup(model, fluid, motions, winds, mouths_of(scene, model))
+    forces = tuple(table.build(scene.constants) for table in scene.force)
+    setup = Setup(model, fluid, motions, winds, forces, mouths_of(scene, model))
     world = World.at_rest(setup)
     world.solid = start
     if world.fluid is not None and scene.fluid is not None:

@@ -76,6 +76,7 @@ NEEDS_BODIES = (
     "initial",
     "motion",
     "wind",
+    "force",
     "mouths",
     "control",
     "objectives",
@@ -115,6 +116,8 @@ def check_bodies(draft: Draft, around: Surroundings) -> Iterator[str]:
     named += check_followed(draft, around)
     for index, wind in enumerate(scene.wind):
         named += draft.said(wind.check(around), "wind", index)
+    for index, force in enumerate(scene.force):
+        named += draft.said(force.check(around), "force", index)
     if scene.policy is not None:
         named += draft.said(scene.policy.check(around), "policy")
     yield from named
@@ -205,9 +208,14 @@ def _formulas(draft: Draft) -> dict[str, str]:
     motions, mouths = enumerate(draft.scene.motion), enumerate(draft.scene.mouths)
     positions = [(n, m.position) for n, m in motions if isinstance(m, MotionFormulaTable)]
     factors = [(n, mouth.factor) for n, mouth in mouths if mouth.factor is not None]
-    return {draft.at("motion", n, "position"): text for n, text in positions} | {
-        draft.at("mouths", n, "factor"): text for n, text in factors
-    }
+    forces = [
+        (n, *formula) for n, force in enumerate(draft.scene.force) for formula in force.formulas()
+    ]
+    return (
+        {draft.at("motion", n, "position"): text for n, text in positions}
+        | {draft.at("mouths", n, "factor"): text for n, text in factors}
+        | {draft.at("force", n, key, place): text for n, key, place, text in forces}
+    )
 
 
 def check_clip(draft: Draft) -> Iterator[str]:

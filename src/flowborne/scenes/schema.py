@@ -30,6 +30,7 @@ from flowborne.scenes.control import ControllerTable, ControlTable
 from flowborne.scenes.domain import Domain, FluidTable
 from flowborne.scenes.dye import DyeTable, SourceTable
 from flowborne.scenes.flesh import FleshTable
+from flowborne.scenes.force import ForceTable
 from flowborne.scenes.motions import EarlierTable, MotionTable
 from flowborne.scenes.mouths import MouthTable
 from flowborne.scenes.policy import PolicyTable
@@ -127,7 +128,7 @@ class Scene(Table):
     figure       figure or section of the paper, or the case
     dimensions   2: a slab one cell thick, everything per unit depth; 3
     gravity      m/s^2
-    constants    name -> number, for the formulas of [[motion]] and [[mouths]]
+    constants    name -> number, for the formulas of [[motion]], [[mouths]] and [[force]]
     plugins      Python files in the scene's folder that register parts of the user
     """
 
@@ -153,6 +154,7 @@ class Scene(Table):
     initial: InitialTable = InitialTable()
     motion: tuple[MotionTable, ...] = ()
     wind: tuple[WindTable, ...] = ()
+    force: tuple[ForceTable, ...] = ()
     mouths: tuple[MouthTable, ...] = ()
     control: tuple[ControlTable, ...] = ()
     objectives: tuple[AnyObjective, ...] = ()
@@ -235,12 +237,13 @@ class Scene(Table):
     def can_settle(self) -> bool:
         """Whether the optimum of the objectives does not depend on time.
 
-        It does with a clip, an earlier run, a moving joint, a mouth, a plan of several knots,
-        phases, changes, a policy, or an objective with a reference motion.
+        It does with a clip, an earlier run, a moving joint, a mouth, a force that changes, a plan
+        of several knots, phases, changes, a policy, or an objective with a reference motion.
         """
         moved = self.clip is not None or self.earlier is not None or bool(self.mouths)
         moved |= not all(table.rests for table in self.motion)
         moved |= bool(self.changes) or self.policy is not None
+        moved |= not all(table.rests for table in self.force)
         planned = self.controller.knots is not None
         phased = any(table.in_phases for table in self.control)
         return not (moved or planned or phased) and all(

@@ -69,6 +69,9 @@ class Columns:
                                                 acceleration; both together are the whole force
       effort                                    |drive force| dt over the controlled dofs, N m s
       work_J                                    that the drives did in the frame
+      applied_force_<body>_x_N … _z_N           sum of the forces from outside on each body on which
+      applied_torque_<body>_x_Nm … _z_Nm        some act, and torque about its centre of mass
+      momentum_applied_x_Ns … _z_Ns             impulse of all these forces in the frame
       flesh_least_detF, flesh_inside_out        least volume of an element over that at rest, number
                                                 of elements inside out, in scenes with flesh
       <body>_x_m … _z_m, <body>_qw … _qz        pose of every body
@@ -103,6 +106,7 @@ class Columns:
             *of_joints(setup, dofs, joints, told),
             *of_objective(controller),
             *of_forces(stream, dofs),
+            *of_applied(setup),
             *of_bodies(setup.solid, bodies),
             *of_fluid(setup),
         )
@@ -239,6 +243,29 @@ def of_forces(stream: tuple[float, ...] | None, controlled: Integers) -> Iterato
     yield Quantity(names, forces, splits=True)
     yield Quantity(["effort"], effort)
     yield of_steps("work")
+
+
+def of_applied(setup: Setup) -> Iterator[Quantity]:
+    """Forces from outside on bodies, and their impulse."""
+    model = setup.solid
+    names = [name for name in model.body_names if name in {force.body for force in setup.forces}]
+    if not names:
+        return
+    pushed = [model.body(name) for name in names]
+    kinds = ("force", "N"), ("torque", "Nm")
+    yield Quantity(
+        [
+            f"applied_{of}_{name}_{axis}_{unit}"
+            for name in names
+            for of, unit in kinds
+            for axis in "xyz"
+        ],
+        lambda frame: frame.applied()[pushed].ravel().tolist(),
+    )
+    yield Quantity(
+        [f"momentum_applied_{axis}_Ns" for axis in "xyz"],
+        lambda frame: sum(step.dt * step.applied_wrench[:, :3].sum(axis=0) for step in frame.steps),
+    )
 
 
 def of_bodies(model: SolidModel, named: tuple[str, ...]) -> Iterator[Quantity]:

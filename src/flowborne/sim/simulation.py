@@ -190,8 +190,9 @@ class Simulation:
     def advance_frame(self, commands: Commands | None = None) -> FrameReport:
         """Decide, then take the steps of one frame, on all cores unless a context allows fewer.
 
-        commands  what joints are told by their names: Position, Velocity or Torque. The scene's
-                  motions and its controller move the others. By default the scene's policy tells
+        commands  what joints are told by their names: Position, Velocity or Torque; and a Force by
+                  a name of its own. The scene's motions and its controller move the other joints.
+                  By default the scene's policy tells
         raises    BlowUpError if a step or the policy fails or a measure is not a finite number;
                   SceneError for a wrong command. After any error the state is that before the frame
         """

@@ -13,6 +13,7 @@ from typing import Protocol
 import numpy as np
 
 from flowborne.kernels.arrays import Array, Integers, Mask
+from flowborne.solids.force import Force
 from flowborne.solids.model import SolidModel
 
 
@@ -238,11 +239,13 @@ class Told:
     motions  to their targets
     pushed   (k,) dofs that a force drives
     force    (k,) N m or N
+    forces   on bodies, besides those of the setup
     """
 
     motions: tuple[Trajectory, ...]
     pushed: Integers
     force: Array
+    forces: tuple[Force, ...] = ()
 
     def force_on(self, nv: int) -> Array:
         """(nv,) generalised force."""
