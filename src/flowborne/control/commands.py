@@ -69,7 +69,7 @@ class Torque:
 @dataclass(frozen=True)
 class Control:
     """What an actuator of the model is told, by its own name: u as MuJoCo's `ctrl`, held within its
-    range.
+    range. A thruster of the scene is told its thrust in N, or its speed in 1/s.
 
     A motor is a torque. A position actuator is a critically damped servo of its stiffness, and a
     velocity actuator an exact one, each with the actuator's largest force.
@@ -93,7 +93,8 @@ def told_by(
     A joint keeps within its range, and moves as its drive can: exactly, by a PD law, or with a
     limited torque, which limits a told torque too.
 
-    commands  by the names of joints, or of actuators for Control; a Force has a name of its own
+    commands  by the names of joints, or of actuators and thrusters for Control; a Force has a
+              name of its own
     span      s, length of the frame
     drives    of the scene itself
     raises    SceneError for a joint or body that is unknown or cannot be driven, and for wrong
@@ -103,9 +104,16 @@ def told_by(
     forces = {name: given for name, given in commands.items() if isinstance(given, Force)}
     for name, pushing in forces.items():
         check_force(pushing, model, name)
+    thrusters = {thruster.name: thruster for thruster in world.setup.thrusters}
+    settings: dict[str, float] = {}
     pushed, force = [np.zeros(0, np.int64)], [np.zeros(0)]
     for name, given in commands.items():
         if isinstance(given, Force):
+            continue
+        if isinstance(given, Control) and name in thrusters:
+            asked = _numbers(name, given.value, 1)
+            settings[name] = float(np.clip(asked, *thrusters[name].limits)[0])
+            beyond += _said(name, asked, np.array([settings[name]]), "N or 1/s")
             continue
         joint, command, own = _actuated(model, name, given)
         dofs = _driven_dofs(model, joint)
@@ -129,7 +137,7 @@ def told_by(
                 "give a Position, a Velocity, a Torque, a Control or a Force"
             )
     joints = tuple(motions), np.concatenate(pushed), np.concatenate(force)
-    return Told(*joints, tuple(forces.values())), tuple(beyond)
+    return Told(*joints, tuple(forces.values()), settings), tuple(beyond)
 
 
 def _actuated(model: SolidModel, name: str, command: Command) -> tuple[str, Command, Servo | None]:

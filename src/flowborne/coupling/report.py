@@ -100,6 +100,9 @@ Worst = Annotated[float, Joined(max, max)]
 no_momentum = partial(np.zeros, 3)
 
 
+no_values = partial(np.zeros, 0)
+
+
 def no_dofs() -> Integers:
     return np.zeros(0, np.int64)
 
@@ -122,8 +125,10 @@ class StepReport:
     viscous_wrench   (nbody, 6) the same of the shear stress
     buoyancy_wrench  (nbody, 6) the same of the hydrostatic pressure (Archimedes)
     wind_wrench      (nbody, 6) the same of the simple winds
-    applied_wrench   (nbody, 6) the same of forces from outside, which is none of the fluid's
+    applied_wrench   (nbody, 6) the same of forces from outside and of thrusters, apart from these
     jet_wrench       (nbody, 6) the same of the reaction of what mouths expel
+    thrust           (nt,) of thrusters, N
+    jet_power        (nt,) that they give to the fluid and their bodies, W
     added_mass       of which `added_mass_wrench` is made
     centre           (nbody, 3) centres of mass at the end of the step, m; 0 where no fluid, wind or
                      force acts
@@ -140,8 +145,8 @@ class StepReport:
                      impulse of the sides of the domain on the fluid: their pressure, and what they
                      stop of the flow that reaches them
     momentum_crossed carried in by the flow itself through the sides
-    momentum_forces  given to the fluid by body forces, driven regions and friction at walls and
-                     bodies
+    momentum_forces  given to the fluid by body forces, thrusters, driven regions and friction at
+                     walls and bodies
     momentum_jet     brought into the fluid by mouths and sources
     expelled         volume that mouths expelled, less what they took in, m^3
     momentum_exchange_error
@@ -175,6 +180,8 @@ class StepReport:
     jet_wrench: Mean
     added_mass: Annotated[Asked, Joined(in_turn)]
     centre: Mean
+    thrust: Mean = field(default_factory=no_values)
+    jet_power: Mean = field(default_factory=no_values)
     work: Annotated[float, Joined(sum, sum, "J")] = 0.0
     momentum_solid: Momentum = field(default_factory=no_momentum)
     momentum_fluid: Momentum = field(default_factory=no_momentum)

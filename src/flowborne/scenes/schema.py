@@ -43,6 +43,7 @@ from flowborne.scenes.schema_bodies import (
 )
 from flowborne.scenes.schema_film import FilmTable
 from flowborne.scenes.sides import BoundariesTable
+from flowborne.scenes.thrusters import ThrusterTable
 from flowborne.scenes.wind import WindTable
 
 
@@ -128,7 +129,8 @@ class Scene(Table):
     figure       figure or section of the paper, or the case
     dimensions   2: a slab one cell thick, everything per unit depth; 3
     gravity      m/s^2
-    constants    name -> number, for the formulas of [[motion]], [[mouths]] and [[force]]
+    constants    name -> number, for the formulas of [[motion]], [[mouths]], [[force]] and
+                 [[thruster]]
     plugins      Python files in the scene's folder that register parts of the user
     """
 
@@ -156,6 +158,7 @@ class Scene(Table):
     wind: tuple[WindTable, ...] = ()
     force: tuple[ForceTable, ...] = ()
     mouths: tuple[MouthTable, ...] = ()
+    thruster: tuple[ThrusterTable, ...] = ()
     control: tuple[ControlTable, ...] = ()
     objectives: tuple[AnyObjective, ...] = ()
     controller: ControllerTable = ControllerTable()
@@ -237,13 +240,14 @@ class Scene(Table):
     def can_settle(self) -> bool:
         """Whether the optimum of the objectives does not depend on time.
 
-        It does with a clip, an earlier run, a moving joint, a mouth, a force that changes, a plan
-        of several knots, phases, changes, a policy, or an objective with a reference motion.
+        It does with a clip, an earlier run, a moving joint, a mouth, a thruster, a force that
+        changes, a plan of several knots, phases, changes, a policy, or an objective with a
+        reference motion.
         """
         moved = self.clip is not None or self.earlier is not None or bool(self.mouths)
         moved |= not all(table.rests for table in self.motion)
         moved |= bool(self.changes) or self.policy is not None
-        moved |= not all(table.rests for table in self.force)
+        moved |= bool(self.thruster) or not all(table.rests for table in self.force)
         planned = self.controller.knots is not None
         phased = any(table.in_phases for table in self.control)
         return not (moved or planned or phased) and all(

@@ -14,6 +14,7 @@ from flowborne.scenes.creature import counted_bodies, creature_extent, unmet_bod
 from flowborne.scenes.domain import Domain, fits_memory
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.seen import Seen, seen_bodies
+from flowborne.scenes.thrusters import clear_parts
 from flowborne.solids.geoms import floors, geom_name, kind_of, rest_poses
 from flowborne.solids.model import SolidModel
 from flowborne.solids.surfaces import geom_boxes
@@ -22,6 +23,9 @@ LEAST_CELLS = 2.0
 """Cells across the thinnest part of a body. A sheet of two cells holds a whole cell wherever it
 lies on the grid; and it is thicker than the diagonal of a cell, 1.43 in slabs and 1.75 in rooms,
 so that the fluid meets the body as thick as it is."""
+
+LEAST_WATER = 0.75
+"""Part of a thruster's disc that is water, below which its jet is not that of the disc."""
 
 LARGEST_DOMAIN = 100.0
 """Shortest side of a domain, in lengths of the creature. Sides that are L away change the added
@@ -250,4 +254,27 @@ def floors_in_fluid(scene: Scene, setup: Setup) -> Iterator[str]:
                 f"[domain]: the {kind} '{geom_name(mj, geom)}' lies inside the fluid, which flows "
                 "through it; a domain that ends there has a solid side, and a box in the model is "
                 "met"
+            )
+
+
+def discs_not_met(scene: Scene, setup: Setup) -> Iterator[str]:
+    """Thrusters with a disc that the grid does not resolve, or that is mostly no water."""
+    if setup.fluid is None or not setup.thrusters:
+        return
+    coarse = [t for t in setup.thrusters if t.radius < setup.fluid.grid.spacing]
+    if coarse:
+        least = min(thruster.radius for thruster in coarse)
+        names = listed([thruster.name for thruster in coarse])
+        yield (
+            f"[[thruster]]: the disc of {names} is less than two cells across, so that its jet is "
+            f"wider and slower than it should be; cells of {least:.3g} m resolve it"
+        )
+    start = initial_state(scene, setup.solid)
+    parts = clear_parts(setup.thrusters, setup, start)
+    for thruster, clear in zip(setup.thrusters, parts, strict=True):
+        if isinstance(clear, float) and clear < LEAST_WATER:
+            yield (
+                f"[[thruster]]: {100.0 * clear:.0f} % of the disc of '{thruster.name}' are water, "
+                "which has the whole thrust, as the rest is in a body or outside the domain; a "
+                "place farther out makes it a whole disc"
             )

@@ -72,6 +72,9 @@ class Columns:
       applied_force_<body>_x_N … _z_N           sum of the forces from outside on each body on which
       applied_torque_<body>_x_Nm … _z_Nm        some act, and torque about its centre of mass
       momentum_applied_x_Ns … _z_Ns             impulse of all these forces in the frame
+      thrust_<thruster>_N                       of each thruster on its body
+      jet_power_<thruster>_W                    that it gives to body and water: thrust times the
+                                                speed with which water goes through it
       flesh_least_detF, flesh_inside_out        least volume of an element over that at rest, number
                                                 of elements inside out, in scenes with flesh
       <body>_x_m … _z_m, <body>_qw … _qz        pose of every body
@@ -97,6 +100,7 @@ class Columns:
         bodies: tuple[str, ...] = (),
         joints: bool | tuple[str, ...] = True,
         told: tuple[str, ...] = (),
+        pushed: tuple[str, ...] = (),
     ) -> None:
         self._controller = controller
         dofs = np.zeros(0, np.int64) if controller is None else controller.dofs
@@ -106,7 +110,7 @@ class Columns:
             *of_joints(setup, dofs, joints, told),
             *of_objective(controller),
             *of_forces(stream, dofs),
-            *of_applied(setup),
+            *of_applied(setup, pushed),
             *of_bodies(setup.solid, bodies),
             *of_fluid(setup),
         )
@@ -245,10 +249,13 @@ def of_forces(stream: tuple[float, ...] | None, controlled: Integers) -> Iterato
     yield of_steps("work")
 
 
-def of_applied(setup: Setup) -> Iterator[Quantity]:
-    """Forces from outside on bodies, and their impulse."""
+def of_applied(setup: Setup, told: tuple[str, ...]) -> Iterator[Quantity]:
+    """Forces from outside on bodies, those that a policy pushes among them, and their impulse;
+    thrusters."""
     model = setup.solid
-    names = [name for name in model.body_names if name in {force.body for force in setup.forces}]
+    found = {*told, *(force.body for force in setup.forces)}
+    found |= {model.body_names[thruster.body] for thruster in setup.thrusters}
+    names = [name for name in model.body_names if name in found]
     if not names:
         return
     pushed = [model.body(name) for name in names]
@@ -265,6 +272,15 @@ def of_applied(setup: Setup) -> Iterator[Quantity]:
     yield Quantity(
         [f"momentum_applied_{axis}_Ns" for axis in "xyz"],
         lambda frame: sum(step.dt * step.applied_wrench[:, :3].sum(axis=0) for step in frame.steps),
+    )
+    thrusters = [thruster.name for thruster in setup.thrusters]
+    yield Quantity(
+        [f"thrust_{name}_N" for name in thrusters],
+        lambda frame: frame.mean(lambda step: step.thrust).tolist(),
+    )
+    yield Quantity(
+        [f"jet_power_{name}_W" for name in thrusters],
+        lambda frame: frame.mean(lambda step: step.jet_power).tolist(),
     )
 
 

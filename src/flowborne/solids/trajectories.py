@@ -7,7 +7,8 @@ muscles", which the paper uses.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -240,12 +241,14 @@ class Told:
     pushed   (k,) dofs that a force drives
     force    (k,) N m or N
     forces   on bodies, besides those of the setup
+    settings of thrusters by name, in place of their own
     """
 
     motions: tuple[Trajectory, ...]
     pushed: Integers
     force: Array
     forces: tuple[Force, ...] = ()
+    settings: Mapping[str, float] = field(default_factory=dict)
 
     def force_on(self, nv: int) -> Array:
         """(nv,) generalised force."""
