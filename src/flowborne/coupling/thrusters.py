@@ -61,10 +61,19 @@ class Thruster:
         """N (N/m in a slab) of a setting, kept within its limits."""
         low, high = self.limits
         kept = min(max(setting, low), high)
+        scale = self._scale(density, slab)
+        return kept if scale is None else scale * kept * abs(kept)
+
+    def setting_of(self, thrust: float, density: float, slab: bool) -> float:
+        """The setting that gives a thrust, whatever the limits."""
+        scale = self._scale(density, slab)
+        return thrust if scale is None else float(np.copysign(np.sqrt(abs(thrust) / scale), thrust))
+
+    def _scale(self, density: float, slab: bool) -> float | None:
+        """T / (n |n|); None where the setting is the thrust."""
         if self.coefficient is None:
-            return kept
-        area = (2.0 * self.radius) ** (3 if slab else 4)
-        return self.coefficient * density * kept * abs(kept) * area
+            return None
+        return self.coefficient * density * (2.0 * self.radius) ** (3 if slab else 4)
 
 
 @dataclass(frozen=True)
