@@ -44,10 +44,10 @@ def vehicle(
     return World.at_rest(replace(world.setup, thrusters=thrusters))
 
 
-def clear_of_the_ball(world: World) -> float:
+def water_at_the_ball(world: World) -> float:
     """Which part of the first disc is water."""
     volumes = volumes_of(world, cut_by_bodies(world))
-    return discs_at(world, kinematics(world.setup.solid, world.solid.q), volumes, 0.0)[0].clear
+    return discs_at(world, kinematics(world.setup.solid, world.solid.q), volumes, 0.0)[0].water
 
 
 @pytest.mark.parametrize("axis", [(1.0, 0.0, 0.0), (0.6, -0.8, 0.0)], ids=["along", "askew"])
@@ -58,8 +58,8 @@ def test_momentum_of_body_and_water_stays(
 ) -> None:
     """Across periodic sides nothing else gives or takes any."""
     world = vehicle(grid, PERIODIC, thruster((place, 0.031, 0.0), axis=axis))
-    clear = clear_of_the_ball(world)
-    assert clear > 0.95 if place == -0.27 else clear < 0.9
+    part = water_at_the_ball(world)
+    assert part > 0.95 if place == -0.27 else part < 0.9
     dt, given = 0.01, np.zeros(3)
     for _ in range(12):
         report = step(world, dt)
@@ -111,7 +111,7 @@ def test_a_disc_across_a_periodic_side_is_whole() -> None:
         volumes = volumes_of(world, cut_by_bodies(world))
         pose = kinematics(world.setup.solid, world.solid.q)
         (disc,) = discs_at(world, pose, volumes, 0.0)
-        assert disc.clear == pytest.approx(1.0, abs=0.01)
+        assert disc.water == pytest.approx(1.0, abs=0.01)
         shares.append(disc.shares[0].size)
     assert np.ptp(shares) <= 6
 

@@ -165,13 +165,15 @@ def test_wrong_thrusters_are_refused(tmp_path: Path, given: str, wanted: str, sa
 @pytest.mark.parametrize(
     ("given", "wanted", "said"),
     [
-        ("radius = 0.08\nrange", "radius = 0.02\nrange", "disc of aft is less than two cells"),
+        ("radius = 0.08", "radius = 0.02", "disc of aft is less than two cells"),
+        ('"top * sin', '"900 * top * sin', "the jet of thruster 'aft' crosses up to"),
         ("[0.0, -0.2, 0.0]", "[0.0, -0.07, 0.0]", "% of the disc of 'side' are water"),
     ],
 )
 def test_poor_discs_are_told(tmp_path: Path, given: str, wanted: str, said: str) -> None:
     scene = hull(tmp_path)
-    scene.write_text(scene.read_text().replace(given, wanted, 1))
+    text = scene.read_text().replace(given, wanted, 1)
+    scene.write_text(text.replace("range = [-5.0, 5.0]\n", ""))
     loaded = fb.load_scene(scene)
     assert any(said in warning for warning in warnings_of(loaded, build(loaded).world.setup))
 

@@ -129,6 +129,7 @@ class StepReport:
     jet_wrench       (nbody, 6) the same of the reaction of what mouths expel
     thrust           (nt,) of thrusters, N
     jet_power        (nt,) that they give to the fluid and their bodies, W
+    disc_water       (nt,) part of their discs that is water
     added_mass       of which `added_mass_wrench` is made
     centre           (nbody, 3) centres of mass at the end of the step, m; 0 where no fluid, wind or
                      force acts
@@ -182,6 +183,7 @@ class StepReport:
     centre: Mean
     thrust: Mean = field(default_factory=no_values)
     jet_power: Mean = field(default_factory=no_values)
+    disc_water: Mean = field(default_factory=no_values)
     work: Annotated[float, Joined(sum, sum, "J")] = 0.0
     momentum_solid: Momentum = field(default_factory=no_momentum)
     momentum_fluid: Momentum = field(default_factory=no_momentum)

@@ -45,7 +45,7 @@ def report_failed(setup: Setup, dt: float, outcome: Outcome) -> StepReport:
     """Of a step that ended before its solve."""
     model, thrust = setup.solid, np.full(len(setup.thrusters), np.nan)
     drives, known = np.full(model.nv, np.nan), fluid_forces(model, np.nan)
-    known |= {"thrust": thrust, "jet_power": thrust}
+    known |= {"thrust": thrust, "jet_power": thrust, "disc_water": thrust}
     return StepReport(dt, outcome, drives, drives, drives, **known)
 
 
@@ -107,8 +107,11 @@ def known_forces(
 def thrust_of(discs: tuple[Disc, ...], solved: SolvedFlow, pose: Kinematics) -> dict[str, Any]:
     """What the report says of thrusters."""
     v = 0.5 * (solved.driven.system.v + solved.v)
-    power = [disc.power(solved.velocity, pose, v) for disc in discs]
-    return {"thrust": np.array([disc.thrust for disc in discs]), "jet_power": np.array(power)}
+    return {
+        "thrust": np.array([disc.thrust for disc in discs]),
+        "jet_power": np.array([disc.power(solved.velocity, pose, v) for disc in discs]),
+        "disc_water": np.array([disc.water for disc in discs]),
+    }
 
 
 def report_coupled(

@@ -85,7 +85,7 @@ class Disc:
     along   (3,) n
     faces   by axis (k,) flat indices of the faces of its water
     shares  by axis (k,) part of T on each; their sum is 1
-    clear   part of the disc that is water: neither in a body nor beyond the domain
+    water   part of the disc that is neither in a body nor beyond the domain
     """
 
     thruster: Thruster
@@ -94,7 +94,7 @@ class Disc:
     along: Array
     faces: tuple[Integers, ...]
     shares: tuple[Array, ...]
-    clear: float
+    water: float
 
     def power(self, velocity: Faces, pose: Kinematics, v: Array) -> float:
         """W that the water and the body get, with this velocity of the fluid (m/s), and that of the

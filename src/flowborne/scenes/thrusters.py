@@ -180,12 +180,12 @@ def check_discs(
     places: Places, thrusters: Sequence[Thruster], setup: Setup, start: SolidState
 ) -> Iterator[str]:
     """Every thruster must have water at the start; for a scene with no other fault."""
-    for index, clear in enumerate(clear_parts(thrusters, setup, start)):
-        if isinstance(clear, str):
-            yield f"{places.at('thruster', index)}: {clear}."
+    for index, part in enumerate(parts_of_water(thrusters, setup, start)):
+        if isinstance(part, str):
+            yield f"{places.at('thruster', index)}: {part}."
 
 
-def clear_parts(
+def parts_of_water(
     thrusters: Sequence[Thruster], setup: Setup, start: SolidState
 ) -> Iterator[float | str]:
     """Which part of the disc of each thruster is water at the start; a sentence where none is."""
@@ -195,6 +195,6 @@ def clear_parts(
     for thruster in thrusters:
         world.setup = setup.but(thrusters=(thruster,))
         try:
-            yield discs_at(world, pose, volumes, 0.0)[0].clear
+            yield discs_at(world, pose, volumes, 0.0)[0].water
         except ValueError as error:
             yield str(error)

@@ -9,12 +9,13 @@ import numpy as np
 
 from flowborne.base.phrases import and_more, listed, rounded_down, rounded_up
 from flowborne.coupling.world import Fluid, Setup
+from flowborne.runs.summary import LEAST_WATER
 from flowborne.scenes.bodies import initial_state
 from flowborne.scenes.creature import counted_bodies, creature_extent, unmet_bodies
 from flowborne.scenes.domain import Domain, fits_memory
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.seen import Seen, seen_bodies
-from flowborne.scenes.thrusters import clear_parts
+from flowborne.scenes.thrusters import parts_of_water
 from flowborne.solids.geoms import floors, geom_name, kind_of, rest_poses
 from flowborne.solids.model import SolidModel
 from flowborne.solids.surfaces import geom_boxes
@@ -23,9 +24,6 @@ LEAST_CELLS = 2.0
 """Cells across the thinnest part of a body. A sheet of two cells holds a whole cell wherever it
 lies on the grid; and it is thicker than the diagonal of a cell, 1.43 in slabs and 1.75 in rooms,
 so that the fluid meets the body as thick as it is."""
-
-LEAST_WATER = 0.75
-"""Part of a thruster's disc that is water, below which its jet is not that of the disc."""
 
 LARGEST_DOMAIN = 100.0
 """Shortest side of a domain, in lengths of the creature. Sides that are L away change the added
@@ -270,11 +268,11 @@ def discs_not_met(scene: Scene, setup: Setup) -> Iterator[str]:
             f"wider and slower than it should be; cells of {least:.3g} m resolve it"
         )
     start = initial_state(scene, setup.solid)
-    parts = clear_parts(setup.thrusters, setup, start)
-    for thruster, clear in zip(setup.thrusters, parts, strict=True):
-        if isinstance(clear, float) and clear < LEAST_WATER:
+    parts = parts_of_water(setup.thrusters, setup, start)
+    for thruster, part in zip(setup.thrusters, parts, strict=True):
+        if isinstance(part, float) and part < LEAST_WATER:
             yield (
-                f"[[thruster]]: {100.0 * clear:.0f} % of the disc of '{thruster.name}' are water, "
+                f"[[thruster]]: {100.0 * part:.0f} % of the disc of '{thruster.name}' are water, "
                 "which has the whole thrust, as the rest is in a body or outside the domain; a "
                 "place farther out makes it a whole disc"
             )

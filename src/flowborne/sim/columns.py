@@ -75,6 +75,7 @@ class Columns:
       thrust_<thruster>_N                       of each thruster on its body
       jet_power_<thruster>_W                    that it gives to body and water: thrust times the
                                                 speed with which water goes through it
+      disc_water_<thruster>                     part of its disc that is water
       flesh_least_detF, flesh_inside_out        least volume of an element over that at rest, number
                                                 of elements inside out, in scenes with flesh
       <body>_x_m … _z_m, <body>_qw … _qz        pose of every body
@@ -281,6 +282,10 @@ def of_applied(setup: Setup, told: tuple[str, ...]) -> Iterator[Quantity]:
     yield Quantity(
         [f"jet_power_{name}_W" for name in thrusters],
         lambda frame: frame.mean(lambda step: step.jet_power).tolist(),
+    )
+    yield Quantity(
+        [f"disc_water_{name}" for name in thrusters],
+        lambda frame: frame.mean(lambda step: step.disc_water).tolist(),
     )
 
 
