@@ -116,6 +116,7 @@ GROUPS = (
             "domain.resolution": "32",
         },
     ),
+    Group("Vehicles", lambda scene: bool(scene.thruster), 180),
     Group(ROBOTS, lambda scene: scene.dimensions == 2, 180),
     Group(ROBOTS, lambda scene: True, 180, {"domain.resolution": "61"}),
 )

@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from flowborne.sim.frame import FrameReport, Snapshot
     from flowborne.sim.running import RunInterrupted, RunResult, run
     from flowborne.sim.simulation import BlowUpError, Simulation
+    from flowborne.solids.force import Force
     from flowborne.solids.model import SolidModel, SolidState
     from flowborne.solids.sensed import ActuatorState, BodyState, JointState
     from flowborne.solids.tissue.growth import Tissue
@@ -65,6 +66,7 @@ __all__ = [
     "FlowState",
     "Fluid",
     "FluidState",
+    "Force",
     "FrameReport",
     "Grid",
     "Hypothesis",
@@ -131,6 +133,7 @@ _PLACES = {
     "FlowState": "flowborne.coupling.stream",
     "Fluid": "flowborne.coupling.world",
     "FluidState": "flowborne.fluid.state",
+    "Force": "flowborne.solids.force",
     "FrameReport": "flowborne.sim.frame",
     "Grid": "flowborne.fluid.grid",
     "Hypothesis": "flowborne.control.trial",

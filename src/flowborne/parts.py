@@ -62,6 +62,7 @@ from flowborne.control.rules import (
     Rule,
     descent,
 )
+from flowborne.control.station import keep_station
 from flowborne.runs.exporters import EXPORTERS, Exporter, Written, endings
 from flowborne.runs.open_run import OpenRun
 from flowborne.runs.states import StateArray
@@ -107,6 +108,7 @@ __all__ = [
     "endings",
     "exporter",
     "gradient",
+    "keep_station",
     "objective",
     "replaced_whole",
     "rule",

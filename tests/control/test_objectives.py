@@ -34,7 +34,7 @@ def measured(make_world: MakeWorld) -> Measurement:
     world.solid.v[:] = [2.0, 0.0, 0.0]
     world.time = 3.0
     rng = np.random.default_rng(1)
-    wrench = rng.normal(size=(5, 4, 6))
+    wrench = rng.normal(size=(6, 4, 6))
     told = np.zeros(3), np.zeros(3), np.array([3.0, -4.0, 12.0]), *wrench
     none = Asked(lambda: np.zeros((4, 6)))
     report = StepReport(0.05, Outcome.DONE, *told, none, np.zeros((4, 3)))

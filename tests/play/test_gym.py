@@ -208,3 +208,24 @@ def test_an_actuator_without_a_range_is_no_action(tmp_path: Path) -> None:
     (tmp_path / "hull.xml").write_text(THRUSTERS.replace(' ctrlrange="-.5 .5"', ""))
     with pytest.raises(fb.SceneError, match="'rudder' has no limit for actions"):
         SceneEnv(path, reward=along_x)
+
+
+def test_a_vehicle_is_told_by_its_thrusters() -> None:
+    """Half ahead by the four of the plane; the reward is minus the way from the start."""
+    env = SceneEnv(coarse("rov"))
+    assert env.action_space.shape == (8,)
+    assert env.observed[-7:] == ("offset_x_m", "offset_y_m", "offset_z_m", "qw", "qx", "qy", "qz")
+    first, _ = env.reset(seed=1)
+    assert first[-7:].tolist() == [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
+    for _ in range(4):
+        seen, reward, _, ended, _ = env.step(np.array([0.5] * 4 + [0.0] * 4))
+    assert ended
+    assert env.simulation.measure()["thrust_front_left_N"] == 10.0
+    assert seen[-7] > 0.0
+    assert reward == pytest.approx(-np.linalg.norm(seen[-7:-4]), rel=1e-5)
+    env.close()
+
+
+def test_without_anything_to_tell_there_is_no_environment() -> None:
+    with pytest.raises(fb.SceneError, match=r"or give a \[\[thruster\]\] a range"):
+        SceneEnv("fish-robot")

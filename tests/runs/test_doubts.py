@@ -137,3 +137,11 @@ def test_a_run_stops_when_a_body_leaves_through_a_side_that_lets_nothing_through
         f"body 'ball' has left the domain through its {kind} side x_max; enlarge [domain], or put "
         "a plane with contact into the model where the side is"
     )
+
+
+def test_a_disc_that_loses_its_water_is_a_doubt(tmp_path):
+    path = tmp_path / "history.csv"
+    columns = ["frame", "disc_water_aft", "disc_water_bow"]
+    path.write_text(",".join(columns) + "\n1,1.0,0.99\n2,0.4,0.98\n3,0.9,0.98\n")
+    (said,) = doubts_of(path, [], FLUID)
+    assert said.startswith("40 % of the disc of thruster 'aft' were water in frame 2, which had")

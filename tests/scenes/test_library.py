@@ -24,6 +24,7 @@ UNCONTROLLED = (
     "eel-room",
     "eel-pair",
     "fish-robot",
+    "rov",
 )
 
 

@@ -15,6 +15,7 @@ from flowborne.control.creature import within_range
 from flowborne.coupling.world import Setup, World
 from flowborne.kernels.arrays import Array, Integers
 from flowborne.solids.actuators import ActuatorServo, actuator_servos, unusable_actuator
+from flowborne.solids.force import Force, check_force
 from flowborne.solids.model import FREE, SolidModel
 from flowborne.solids.motors import Controls, control_range, driven_by, inputs_of
 from flowborne.solids.trajectories import (
@@ -70,7 +71,7 @@ class Torque:
 @dataclass(frozen=True)
 class Control:
     """What an actuator of the model is told, by its own name: u as MuJoCo's `ctrl`, held within its
-    range.
+    range. A thruster of the scene is told its thrust in N, or its speed in 1/s.
 
     On a hinge or slide a position actuator is a critically damped servo of its stiffness, and a
     velocity actuator an exact one, each with the actuator's largest force. All others, such as
@@ -83,7 +84,7 @@ class Control:
     value: Numbers
 
 
-Command = Position | Velocity | Torque | Control
+Command = Position | Velocity | Torque | Control | Force
 Commands = Mapping[str, Command]
 
 Drives = Sequence[tuple[Integers, Servo]]
@@ -93,22 +94,37 @@ Drives = Sequence[tuple[Integers, Servo]]
 def told_by(
     commands: Commands, world: World, span: float, drives: Drives
 ) -> tuple[Told, tuple[str, ...]]:
-    """What joints are told by commands, and which of their limits these would have passed.
+    """What joints and bodies are told by commands, and which limits these would have passed.
 
     A joint keeps within its range, and moves as its drive can: exactly, by a PD law, or with a
     limited torque, which limits a told torque too.
 
-    commands  by the names of joints, or of actuators for Control
+    commands  by the names of joints, or of actuators and thrusters for Control; a Force has a
+              name of its own
     span      s, length of the frame
     drives    of the scene itself
-    raises    SceneError for a joint that is unknown or cannot be driven, and for wrong numbers
+    raises    SceneError for a joint or body that is unknown or cannot be driven, and for wrong
+              numbers
     """
     model, motions, beyond = world.setup.solid, list[Trajectory](), list[str]()
+    forces = {name: given for name, given in commands.items() if isinstance(given, Force)}
+    for name, pushing in forces.items():
+        check_force(pushing, model, name)
+    thrusters = {thruster.name: thruster for thruster in world.setup.thrusters}
+    settings: dict[str, float] = {}
     pushed, force = [np.zeros(0, np.int64)], [np.zeros(0)]
     controls, servos = Controls.none(model), list[tuple[int, int]]()
     as_servo = _sole_servos(model, commands)
     for name, given in commands.items():
-        joint, command, own = name, given, None
+        if isinstance(given, Force):
+            continue
+        if isinstance(given, Control) and name in thrusters:
+            asked = _numbers(name, given.value, 1)
+            settings[name] = float(np.clip(asked, *thrusters[name].limits)[0])
+            beyond += _said(name, asked, np.array([settings[name]]), "N or 1/s")
+            continue
+        joint, own = name, None
+        command: Command = given
         if isinstance(given, Control):
             number, values, said = _controlled(model, name, given)
             beyond += said
@@ -138,11 +154,12 @@ def told_by(
         else:
             raise SceneError(
                 f"the command to '{joint}' is {command!r:.60}: "
-                "give a Position, a Velocity, a Torque or a Control"
+                "give a Position, a Velocity, a Torque, a Control or a Force"
             )
     pushes = np.concatenate(pushed), np.concatenate(force)
     acting = controls if controls.told.any() or servos else None
-    return Told(tuple(motions), *pushes, acting, servos), tuple(beyond)
+    joints = tuple(motions), *pushes, acting, servos
+    return Told(*joints, tuple(forces.values()), settings), tuple(beyond)
 
 
 def _controlled(model: SolidModel, name: str, command: Control) -> tuple[int, Array, list[str]]:

@@ -16,7 +16,7 @@ from flowborne.coupling.operators import generalised, twists
 from flowborne.coupling.report import StepReport, timed
 from flowborne.coupling.solve import solve_bodies
 from flowborne.coupling.step_report import fluid_forces, report_bodies
-from flowborne.coupling.stream import winds_on
+from flowborne.coupling.stream import forces_on, winds_on
 from flowborne.coupling.world import World
 from flowborne.fluid.transport import parts_for
 from flowborne.kernels.arrays import Array
@@ -82,15 +82,15 @@ def activate(world: World, dt: float) -> None:
 
 @timed("solids")
 def step_bodies(world: World, dt: float, command: JointCommand) -> StepReport:
-    """A step without a fluid, in place: simple winds, gravity, joints and contact."""
+    """A step without a fluid, in place: simple winds, forces, gravity, joints and contact."""
     model, before, force = world.setup.solid, world.solid.copy(), np.zeros(world.setup.solid.nv)
     move_bodies(world, command, dt)
     known = fluid_forces(model, 0.0)
-    if world.setup.winds:
+    if world.setup.winds or world.setup.forces or world.told.forces:
         pose = kinematics(model, world.solid.q)
-        wind = winds_on(world, pose)
-        force = generalised(pose, np.append(wind, np.zeros(pose.vertices.size)))
-        known |= {"centre": pose.mass_centre, "wind_wrench": wind}
+        wind, applied = winds_on(world, pose), forces_on(world, pose, world.time + dt)
+        force = generalised(pose, np.append(wind + applied, np.zeros(pose.vertices.size)))
+        known |= {"centre": pose.mass_centre, "wind_wrench": wind, "applied_wrench": applied}
     driven = equations(world, before, force, command, dt)
     solved = solve_bodies(driven, command.torque_limit)
     world.solid.v[:] = solved.v

@@ -1,5 +1,5 @@
-"""The grid around the bodies: where they cut it, how it follows them by whole cells, what mouths
-and sources bring into it, and what a step starts from."""
+"""The grid around the bodies: where they cut it, how it follows them by whole cells, what mouths,
+sources and thrusters do to it, and what a step starts from."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from flowborne.coupling.flesh import skins_on
 from flowborne.coupling.fractions import Geometry, geometry
 from flowborne.coupling.mouths import Jet, add_rates, jet_of
 from flowborne.coupling.report import timed
+from flowborne.coupling.thrusters import Disc, discs_of
 from flowborne.coupling.world import Fluid, Setup, World
 from flowborne.fluid.boundary import cells_in
 from flowborne.fluid.control_volumes import (
@@ -76,6 +77,21 @@ def jets_at(world: World, time: float) -> tuple[Jet, ...]:
     pose, cut = pose_and_cut(world)
     given = cut, pose, world.solid.v, world.flow()[0].grid, time
     return tuple(jet_of(mouth, *given) for mouth in setup.mouths)
+
+
+def discs_at(
+    world: World, pose: Kinematics, volumes: ControlVolumes, time: float
+) -> tuple[Disc, ...]:
+    """What the thrusters do at `time` (s) with bodies in a pose, on these control volumes.
+
+    raises  BreakdownError when one of them has no water
+    """
+    setup = world.setup
+    if not setup.thrusters:
+        return ()
+    fluid, _ = world.flow()
+    around = fluid.boundaries, fluid.grid, fluid.density
+    return discs_of(setup.thrusters, world.told.settings, pose, volumes, *around, time)
 
 
 def source_rate(fluid: Fluid, time: float, opened: Faces) -> Array:

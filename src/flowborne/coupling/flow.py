@@ -20,6 +20,7 @@ from flowborne.coupling.mouths import (
 )
 from flowborne.coupling.operators import boundary_velocity, motion_of
 from flowborne.coupling.solve import SolvedFlow
+from flowborne.coupling.thrusters import Disc, push_water
 from flowborne.coupling.world import Fluid, World
 from flowborne.fluid.boundary import cells_in
 from flowborne.fluid.control_volumes import ControlVolumes, control_volumes
@@ -131,10 +132,15 @@ def advect_momentum(
     )
 
 
-def apply_body_force_and_sides(
-    advected: AdvectionResult, opened: Faces, fluid: Fluid, time: float, dt: float
+def apply_forces_and_sides(
+    advected: AdvectionResult,
+    opened: Faces,
+    fluid: Fluid,
+    discs: tuple[Disc, ...],
+    time: float,
+    dt: float,
 ) -> Faces:
-    """u*: velocity with the body force, driven regions and prescribed sides.
+    """u*: velocity with the body force, thrusters, driven regions and prescribed sides.
 
     A body force acts like the pressure that balances it, on the open part of a face.
 
@@ -143,13 +149,14 @@ def apply_body_force_and_sides(
     grid, density = fluid.grid, fluid.density
     sources = [(s, s.velocity) for s in fluid.sources if s.active(time)]
     driven = [(cells_in(s, grid), u) for s, u in sources if u is not None]
-    if not driven and not any(fluid.body_force):
+    if not (driven or discs or any(fluid.body_force)):
         return advected.velocity
     velocity = faces_of([u.copy() for u in advected.velocity])
     if any(fluid.body_force):
         rates = accelerated(opened, advected.volumes.moving, density, grid, fluid.boundaries)
         for axis in grid.axes:
             velocity[axis][:] += dt * density * fluid.body_force[axis] * grid.spacing * rates[axis]
+    push_water(velocity, discs, advected.volumes, density, dt)
     for axis in grid.axes:
         for cells, driven_velocity in driven:
             box = list(cells)

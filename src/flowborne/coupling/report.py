@@ -100,6 +100,9 @@ Worst = Annotated[float, Joined(max, max)]
 no_momentum = partial(np.zeros, 3)
 
 
+no_values = partial(np.zeros, 0)
+
+
 def no_dofs() -> Integers:
     return np.zeros(0, np.int64)
 
@@ -123,10 +126,14 @@ class StepReport:
     viscous_wrench   (nbody, 6) the same of the shear stress
     buoyancy_wrench  (nbody, 6) the same of the hydrostatic pressure (Archimedes)
     wind_wrench      (nbody, 6) the same of the simple winds
+    applied_wrench   (nbody, 6) the same of forces from outside and of thrusters, apart from these
     jet_wrench       (nbody, 6) the same of the reaction of what mouths expel
+    thrust           (nt,) of thrusters, N
+    jet_power        (nt,) that they give to the fluid and their bodies, W
+    disc_water       (nt,) part of their discs that is water
     added_mass       of which `added_mass_wrench` is made
-    centre           (nbody, 3) centres of mass at the end of the step, m; 0 where neither a fluid
-                     nor a wind acts
+    centre           (nbody, 3) centres of mass at the end of the step, m; 0 where no fluid, wind or
+                     force acts
     work             of the drives and of the model's actuators, J
     momentum_solid   of the bodies half a step on, which keeps what it is given exactly
                      (see solids.momentum.halfway_momentum)
@@ -140,8 +147,8 @@ class StepReport:
                      impulse of the sides of the domain on the fluid: their pressure, and what they
                      stop of the flow that reaches them
     momentum_crossed carried in by the flow itself through the sides
-    momentum_forces  given to the fluid by body forces, driven regions and friction at walls and
-                     bodies
+    momentum_forces  given to the fluid by body forces, thrusters, driven regions and friction at
+                     walls and bodies
     momentum_jet     brought into the fluid by mouths and sources
     expelled         volume that mouths expelled, less what they took in, m^3
     momentum_exchange_error
@@ -176,9 +183,13 @@ class StepReport:
     viscous_wrench: Mean
     buoyancy_wrench: Mean
     wind_wrench: Mean
+    applied_wrench: Mean
     jet_wrench: Mean
     added_mass: Annotated[Asked, Joined(in_turn)]
     centre: Mean
+    thrust: Mean = field(default_factory=no_values)
+    jet_power: Mean = field(default_factory=no_values)
+    disc_water: Mean = field(default_factory=no_values)
     work: Annotated[float, Joined(sum, sum, "J")] = 0.0
     momentum_solid: Momentum = field(default_factory=no_momentum)
     momentum_fluid: Momentum = field(default_factory=no_momentum)
@@ -220,6 +231,10 @@ class StepReport:
     def central_wrench(self) -> Array:
         """(nbody, 6) `fluid_wrench` about each body's centre of mass."""
         return about(self.fluid_wrench(), self.centre)
+
+    def central_applied(self) -> Array:
+        """(nbody, 6) `applied_wrench` about each body's centre of mass."""
+        return about(self.applied_wrench, self.centre)
 
     def central_added_mass(self) -> Array:
         """(nbody, 6) `added_mass_wrench` about each body's centre of mass."""

@@ -70,7 +70,7 @@ def set_going(world: World, given: Mask | None = None) -> None:
     if fluid.one_way:
         return
     there = world.copy()
-    there.setup = world.setup.but(motions=(), winds=())
+    there.setup = world.setup.but(motions=(), winds=(), forces=(), thrusters=())
     command = JointCommand.none(there.solid.v.size)
     kept = np.ones(there.solid.v.size, bool) if given is None else given
     command.set(kept, 0.0, there.solid.v[kept])

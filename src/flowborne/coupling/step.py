@@ -41,12 +41,12 @@ from flowborne.coupling.bodies_step import (
     position_velocity,
     step_bodies,
 )
-from flowborne.coupling.cut import departure, follow, jets_at, pose_and_cut
+from flowborne.coupling.cut import departure, discs_at, follow, jets_at, pose_and_cut
 from flowborne.coupling.drives import joint_command
 from flowborne.coupling.far_field import far_field
 from flowborne.coupling.flow import (
     advect,
-    apply_body_force_and_sides,
+    apply_forces_and_sides,
     leak_proof_transport,
     store_state,
 )
@@ -54,7 +54,7 @@ from flowborne.coupling.half_pressure import explicit_half_pressure
 from flowborne.coupling.operators import generalised
 from flowborne.coupling.report import Outcome, StepReport, joined, timed
 from flowborne.coupling.solve import solve_together
-from flowborne.coupling.step_report import known_forces, report_coupled, report_failed
+from flowborne.coupling.step_report import known_forces, report_coupled, report_failed, thrust_of
 from flowborne.coupling.world import World
 from flowborne.kernels.faces import is_finite
 from flowborne.solids.trajectories import JointCommand
@@ -104,7 +104,7 @@ def step_part(world: World, dt: float, command: JointCommand) -> StepReport:
 @timed("advection")
 def step_coupled(world: World, dt: float, command: JointCommand) -> StepReport:
     """Bodies and fluid a step later, in place; the numbers are those above."""
-    (fluid, state), model, end = world.flow(), world.setup.solid, world.time + dt
+    (fluid, state), end = world.flow(), world.time + dt
     start = departure(world)
     far = far_field(world, start, dt)
     half = explicit_half_pressure(world, start, dt)  # 1
@@ -114,16 +114,17 @@ def step_coupled(world: World, dt: float, command: JointCommand) -> StepReport:
     transport = leak_proof_transport(world, start, cut, dt)  # 4
     advected, dyed = advect(world, start, half.velocity, transport)  # 5
     driven_sides = far.drive(advected, cut.open, fluid)
-    velocity = apply_body_force_and_sides(driven_sides, cut.open, fluid, end, dt)
+    volumes = advected.volumes
+    discs = discs_at(world, pose, volumes, end)
+    velocity = apply_forces_and_sides(driven_sides, cut.open, fluid, discs, end, dt)
     if not all(is_finite(velocity[axis]) for axis in fluid.grid.axes):
-        return report_failed(model, dt, Outcome.ADVECTION_NOT_FINITE)
+        return report_failed(world.setup, dt, Outcome.ADVECTION_NOT_FINITE)
     with timed("solids"):
-        push, known = known_forces(world, pose, half.impulse, advected.jets, dt)
+        push, known = known_forces(world, pose, half.impulse, advected.jets, discs, dt)
         driven = equations(world, start.bodies, generalised(pose, push), command, dt)
     jets, limit = jets_at(world, end), command.torque_limit
-    volumes = advected.volumes
     solved = solve_together(world, velocity, volumes, driven, pose, cut, jets, limit)  # 6
     store_state(world, start, half, advected, dyed, solved, cut, pose)  # 7
     state.wake, state.sea = far.wake, far.velocity
-    known |= {"dye_budget_error": dyed.error}
+    known |= thrust_of(discs, solved, pose) | {"dye_budget_error": dyed.error}
     return report_coupled(world, dt, pose, half, driven_sides, solved, known)

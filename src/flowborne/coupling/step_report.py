@@ -14,8 +14,9 @@ from flowborne.coupling.mouths import Jet, jet_wrench
 from flowborne.coupling.operators import buoyancy_wrench
 from flowborne.coupling.report import FIELDS, Asked, Outcome, StepReport
 from flowborne.coupling.solve import Solved, SolvedFlow
-from flowborne.coupling.stream import winds_on
-from flowborne.coupling.world import World
+from flowborne.coupling.stream import forces_on, winds_on
+from flowborne.coupling.thrusters import Disc, thrust_wrench
+from flowborne.coupling.world import Setup, World
 from flowborne.fluid.control_volumes import momentum_changes
 from flowborne.kernels.arrays import Array
 from flowborne.kernels.faces import is_finite
@@ -40,12 +41,13 @@ def fluid_forces(model: SolidModel, value: float) -> dict[str, Any]:
     return dict.fromkeys(WRENCHES, wrench) | around
 
 
-def report_failed(model: SolidModel, dt: float, outcome: Outcome) -> StepReport:
+def report_failed(setup: Setup, dt: float, outcome: Outcome) -> StepReport:
     """Of a step that ended before its solve."""
-    drives = np.full(model.nv, np.nan)
-    forces = fluid_forces(model, np.nan)
-    none = np.full(model.outputs, np.nan)
-    return StepReport(dt, outcome, drives, drives, drives, **forces, output=none, output_power=none)
+    model, thrust = setup.solid, np.full(len(setup.thrusters), np.nan)
+    drives, known = np.full(model.nv, np.nan), fluid_forces(model, np.nan)
+    known |= {"thrust": thrust, "jet_power": thrust, "disc_water": thrust}
+    known |= dict.fromkeys(("output", "output_power"), np.full(model.outputs, np.nan))
+    return StepReport(dt, outcome, drives, drives, drives, **known)
 
 
 def report_bodies(world: World, dt: float, solved: Solved, known: dict[str, Any]) -> StepReport:
@@ -85,11 +87,16 @@ def report_bodies(world: World, dt: float, solved: Solved, known: dict[str, Any]
 
 
 def known_forces(
-    world: World, pose: Kinematics, half: Array, jets: tuple[Jet, ...], dt: float
+    world: World,
+    pose: Kinematics,
+    half: Array,
+    jets: tuple[Jet, ...],
+    discs: tuple[Disc, ...],
+    dt: float,
 ) -> tuple[Array, dict[str, Any]]:
-    """(k,) force on the bodies that is known before the solve, N and N m: of winds, of jets, of the
-    hydrostatic pressure, and of half of the last pressure with the impulse `half` (k,); and what
-    the report says of it."""
+    """(k,) force on the bodies that is known before the solve, N and N m: of winds, of forces from
+    outside and thrusters at the end of the step, of jets, of the hydrostatic pressure, and of half
+    of the last pressure with the impulse `half` (k,); and what the report says of it."""
     model, density = world.setup.solid, world.flow()[0].density
     buoyancy = buoyancy_wrench(pose.centroid, model.volume, model.gravity, density).ravel()
     if model.flesh is not None:
@@ -98,12 +105,24 @@ def known_forces(
         buoyancy = np.append(buoyancy, pressed)
     wind, jet = winds_on(world, pose), jet_wrench(jets, density, model.nbody)
     push = buoyancy + half / dt
-    push[: 6 * model.nbody] += (wind + jet).ravel()
+    applied = forces_on(world, pose, world.time + dt) + thrust_wrench(discs, model.nbody)
+    push[: 6 * model.nbody] += (wind + applied + jet).ravel()
     return push, {
         "buoyancy_wrench": on_bodies(pose, model.flesh, buoyancy),
         "wind_wrench": wind,
+        "applied_wrench": applied,
         "jet_wrench": jet,
         "expelled": dt * sum(jet.rate for jet in jets),
+    }
+
+
+def thrust_of(discs: tuple[Disc, ...], solved: SolvedFlow, pose: Kinematics) -> dict[str, Any]:
+    """What the report says of thrusters."""
+    v = 0.5 * (solved.driven.system.v + solved.v)
+    return {
+        "thrust": np.array([disc.thrust for disc in discs]),
+        "jet_power": np.array([disc.power(solved.velocity, pose, v) for disc in discs]),
+        "disc_water": np.array([disc.water for disc in discs]),
     }
 
 

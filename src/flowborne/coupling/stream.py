@@ -1,5 +1,6 @@
-"""The fluid at points: one-way coupling, in which its velocity is a simple wind on the bodies
-(eq. 2), and the flow that a creature's sensors read."""
+"""What acts on the bodies from outside, simple winds and forces; and the fluid at points: one-way
+coupling, in which its velocity is such a wind (eq. 2), and the flow that a creature's sensors
+read."""
 
 from __future__ import annotations
 
@@ -64,6 +65,14 @@ def winds_on(world: World, pose: Kinematics) -> Array:
             field = Sampled(world.fluid.velocity, world.flow()[0].grid)
             blowing = WindFaces(field, wind.density, wind.bodies)
         total += blowing.wrench(world.setup.solid, pose, world.solid.v, world.time)
+    return total
+
+
+def forces_on(world: World, pose: Kinematics, time: float) -> Array:
+    """(nbody, 6) wrench at `time` (s) of the forces from outside on each body about the origin."""
+    total = np.zeros((len(pose.body_position), 6))
+    for force in (*world.setup.forces, *world.told.forces):
+        total += force.wrench(world.setup.solid, pose, world.solid.v, time)
     return total
 
 

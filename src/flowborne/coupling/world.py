@@ -13,6 +13,7 @@ from flowborne.coupling.band import Band, Projection
 from flowborne.coupling.fractions import Geometry
 from flowborne.coupling.mouths import Mouth
 from flowborne.coupling.shapes import Shapes, shapes
+from flowborne.coupling.thrusters import Thruster
 from flowborne.fluid.boundary import Boundaries, Source
 from flowborne.fluid.control_volumes import ControlVolumes
 from flowborne.fluid.grid import Grid
@@ -22,6 +23,7 @@ from flowborne.fluid.wake import wake_shape
 from flowborne.fluid.window import Window, crosses
 from flowborne.kernels.arrays import Array
 from flowborne.solids.dynamics import Kinematics
+from flowborne.solids.force import Force
 from flowborne.solids.model import SolidModel, SolidState
 from flowborne.solids.motors import Motors
 from flowborne.solids.prescribed import PrescribedSystem
@@ -78,7 +80,10 @@ class Setup:
     fluid    the fluid, or None (simple wind and gravity only)
     motions  prescribed motions of some dofs
     winds    simple winds (paper eq. 2, or a uniform force)
+    forces   on single bodies, from outside
     mouths   patches of skin through which fluid is expelled; needs a fluid that is not one-way
+    thrusters
+             discs that push a body and the fluid apart; likewise
     trial    whether steps are hypothetical, and may be longer than those of the world itself
     balances whether steps report momenta, divergence, the fastest flow and the added-mass part of
              forces; else they are nan, as in trials
@@ -91,7 +96,9 @@ class Setup:
     fluid: Fluid | None = None
     motions: tuple[Trajectory, ...] = ()
     winds: tuple[Wind, ...] = ()
+    forces: tuple[Force, ...] = ()
     mouths: tuple[Mouth, ...] = ()
+    thrusters: tuple[Thruster, ...] = ()
     trial: bool = False
     balances: bool = True
     splits: bool = False
@@ -144,7 +151,8 @@ class World:
     ahead   s by which v is ahead of the positions: half of the last part of a step of its own
     parts   most parts that a step of the world itself has been divided into, see `bodies_step`
     memory  the controller's own arrays, by name
-    told    what joints are told from outside in this frame: not part of the state
+    told    what joints, bodies and thrusters are told from outside in this frame: not part of the
+            state
     cut     the positions (nq,) for which the grid was cut last, the bodies there, and that cut:
             made from the state, and not part of it
     volumes the cut that the last step ended with, and its control volumes; likewise

@@ -39,8 +39,10 @@ from flowborne.scenes.schema import Scene
 from flowborne.sim.columns import sensor_values
 from flowborne.sim.frame import FrameReport
 from flowborne.sim.simulation import BlowUpError, Simulation
+from flowborne.solids.geoms import quaternion_of
 from flowborne.solids.model import SLIDE
 from flowborne.solids.motors import control_range
+from flowborne.solids.sensed import BodyState
 from flowborne.solids.sensors import sensor_columns
 
 __all__ = ["ENVIRONMENTS", "SceneEnv"]
@@ -55,6 +57,7 @@ ENVIRONMENTS = {
     "eel-sea": "eel-sea",
     "swimmer-sea": "swimmer-sea",
     "flyer": "flyer-air",
+    "rov": "rov",
 }
 """Name of an environment -> its scene."""
 
@@ -63,15 +66,18 @@ Reward = Callable[[Simulation, FrameReport], float]
 
 
 class SceneEnv(gymnasium.Env):  # type: ignore[name-defined]
-    """A scene whose controlled joints and actuators, or some of them, are told by a policy.
+    """A scene whose controlled joints, actuators and thrusters, or some, are told by a policy.
 
     An action has a number from -1 to 1 for each dof of these joints: part of its strength in the
     scene ("velocity"), a place in its range ("position"), or part of its torque limit ("torque").
-    After them it has one for each control of the actuators: a place in its range.
+    After them it has one for each control of the actuators, then one for each thruster that has a
+    range: a place in its range.
     An observation has, for each of the joints and of those that the actuators drive, position
     (scalar joints), velocity and drive force, then activations and forces of the actuators,
-    velocity and angular velocity of the body that carries the creature in its own axes, and the
-    model's sensors; see `observed`. It is zero before the first frame where only a step can tell.
+    velocity and angular velocity of the body that carries the creature in its own axes, with such
+    thrusters how far it is from where it started, in its own axes, and its orientation
+    (w, x, y, z), and the model's sensors; see `observed`. It is zero before the first frame where
+    only a step can tell.
 
     scene        a Scene, the name of a built-in one, or the path of a scene file
     joints       those that the policy tells; all controlled ones when None. The controller decides
@@ -80,12 +86,13 @@ class SceneEnv(gymnasium.Env):  # type: ignore[name-defined]
                  in a scene that controls no joint and has no [[actuator]], else none
     kind         what an action means
     every        frames for which an action holds
-    reward       of a frame; by default minus the scene's objectives, in the mean over the frames of
-                 an action
+    reward       of a frame; by default minus the scene's objectives, and in a scene of thrusters
+                 without joints minus the distance in m from where the vehicle started; in the mean
+                 over the frames of an action
     observe      another observation, (n,) numbers
     render_mode  "rgb_array", or None
-    raises       SceneError for a wrong scene, joints without a limit that `kind` needs, and without
-                 objectives or a reward
+    raises       SceneError for a wrong scene, joints without a limit that `kind` needs, without
+                 anything to tell, and without objectives or a reward
 
     simulation  the Simulation
     observed    names of the numbers of an observation
@@ -107,18 +114,23 @@ class SceneEnv(gymnasium.Env):  # type: ignore[name-defined]
     ) -> None:
         self.scene = load_scene(scene) if isinstance(scene, str | Path) else scene
         self.simulation = Simulation(self.scene, workers=1)
+        ranged = (t for t in self.simulation.setup.thrusters if np.isfinite(t.limits).all())
+        self._thrusters = {thruster.name: thruster.limits for thruster in ranged}
         self._actuators = self._told_actuators(joints, actuators)
         self._joints = self._told(joints)
         self._kind, self._every, self.render_mode = kind, every, render_mode
-        self._objective, self._own_observe = reward or self._minus_objectives, observe
-        if reward is None and self.simulation.controller is None:
+        controlled = self.simulation.controller is not None
+        if reward is None and not (controlled or self._thrusters):
             raise SceneError(
                 f"scene {self.scene.name} has no [[objectives]], so an environment of it has no "
                 "reward. Give one: reward = a function of the simulation and the frame's report."
             )
+        own = self._minus_objectives if controlled else self._minus_distance
+        self._objective, self._own_observe = reward or own, observe
         self._low, self._high = self._limits()
-        self.observed = tuple(self._observed())
         self._start = self.simulation.snapshot()
+        self._place = self._root().centre
+        self.observed = tuple(self._observed())
         rate = self.scene.time.frames_per_second / every
         self.metadata = {**self.metadata, "render_fps": rate}
         box, inf = gymnasium.spaces.Box, np.inf
@@ -172,11 +184,12 @@ class SceneEnv(gymnasium.Env):  # type: ignore[name-defined]
         controlled = self.scene.controlled_joints()
         found = controlled if joints is None else tuple(joints)
         others = [joint for joint in found if joint not in controlled]
-        if others or not (found or self._actuators):
+        if others or not (found or self._actuators or self._thrusters):
             which = f"joint '{others[0]}'" if others else "what a policy is to move"
             raise SceneError(
                 f"scene {self.scene.name}: {which} is not among the controlled ones. "
-                "Name in [[control]] the joints that a policy is to move, or give actuators."
+                "Name in [[control]] the joints that a policy is to move, give actuators, "
+                "or give a [[thruster]] a range."
             )
         return found
 
@@ -224,13 +237,15 @@ class SceneEnv(gymnasium.Env):  # type: ignore[name-defined]
                     f"scene {self.scene.name}: actuator '{name}' has no limit for actions. Give it "
                     "a ctrlrange in the model, or name others in actuators."
                 )
+        ends += [np.array(limits)[:, None] for limits in self._thrusters.values()]
         both = np.concatenate(ends, axis=1)
         return both[0], both[1]
 
     def _commands(self, action: Array) -> dict[str, Command]:
         """Commands of an action, clipped to [-1, 1]."""
         part = 0.5 * (1.0 + np.clip(action, -1.0, 1.0))
-        wanted, commands, first = self._low + part * (self._high - self._low), {}, 0
+        wanted = self._low + part * (self._high - self._low)
+        commands, first = dict[str, Command](), 0
         make = {"velocity": Velocity, "position": Position, "torque": Torque}[self._kind]
         for joint in self._joints:
             count = self.simulation.setup.solid.dofs_of(joint).size
@@ -240,6 +255,7 @@ class SceneEnv(gymnasium.Env):  # type: ignore[name-defined]
             count = control_range(self.simulation.setup.solid, self._number(name))[0].size
             commands[name] = Control(wanted[first : first + count])
             first += count
+        commands |= zip(self._thrusters, map(Control, wanted[first:].tolist()), strict=True)
         return commands
 
     def _number(self, actuator: str) -> int:
@@ -263,17 +279,29 @@ class SceneEnv(gymnasium.Env):  # type: ignore[name-defined]
             for word, values in (("activation", acting.activation), ("force", acting.force)):
                 for place, value in enumerate(values):
                     found[f"{word}_{name}" + f"_{place}" * (len(values) > 1)] = value
-        root = simulation.body(model.body_names[int(model.moving.argmax())])
+        root = self._root()
         velocity, turn = root.velocity @ root.rotation, root.angular_velocity @ root.rotation
         found |= {f"velocity_{axis}_m/s": v for axis, v in zip("xyz", velocity, strict=True)}
         found |= {f"turn_{axis}_rad/s": v for axis, v in zip("xyz", turn, strict=True)}
+        if self._thrusters:
+            offset = (root.centre - self._place) @ root.rotation
+            found |= {f"offset_{axis}_m": x for axis, x in zip("xyz", offset, strict=True)}
+            found |= zip(("qw", "qx", "qy", "qz"), quaternion_of(root.rotation), strict=True)
         columns = sensor_columns(model)
         return found | dict(zip(columns, sensor_values(simulation.snapshot()), strict=True))
+
+    def _root(self) -> BodyState:
+        """The body that carries the creature."""
+        model = self.simulation.setup.solid
+        return self.simulation.body(model.body_names[int(model.moving.argmax())])
 
     def _observation(self) -> Array:
         if self._own_observe is not None:
             return np.asarray(self._own_observe(self.simulation), np.float32)
         return np.nan_to_num([*self._observed().values()]).astype(np.float32)
+
+    def _minus_distance(self, simulation: Simulation, report: FrameReport) -> float:
+        return -float(np.linalg.norm(self._root().centre - self._place))
 
     def _minus_objectives(self, simulation: Simulation, report: FrameReport) -> float:
         controller = simulation.controller

@@ -6,7 +6,7 @@ import os
 import platform
 import sys
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cache
 from importlib.metadata import version
 from itertools import islice
@@ -33,6 +33,9 @@ BUDGET_OPEN = 1e-6
 
 APART = 1e-4
 """`sweep_error` above which viscosity and pressure are apart: `coupling.creeping.AGREED`."""
+
+LEAST_WATER = 0.75
+"""Part of a thruster's disc that is water, below which its jet is not that of the disc."""
 
 
 def final_frames(frames: int) -> int:
@@ -153,7 +156,7 @@ def doubts_of(history: Path, bodies: Sequence[str], fluid: Fluid | None) -> list
     if fluid is None:
         return []
     found = departure(history, bodies, fluid), open_budget(history), apart(history)
-    return [doubt for doubt in found if doubt]
+    return [*(doubt for doubt in found if doubt), *dry_discs(history)]
 
 
 def departure(history: Path, bodies: Sequence[str], fluid: Fluid) -> str | None:
@@ -211,3 +214,19 @@ def worst(history: Path, column: str) -> tuple[float, float]:
     rows = history_rows(history, ["frame", column])
     frame, value = max(rows, key=lambda row: row[1], default=(0.0, 0.0))
     return frame, value
+
+
+def dry_discs(history: Path) -> Iterator[str]:
+    """Thrusters whose discs lost more of their water than LEAST_WATER leaves."""
+    for column in history_columns(history):
+        if not column.startswith("disc_water_"):
+            continue
+        rows = history_rows(history, ["frame", column])
+        frame, part = min(rows, key=lambda row: row[1], default=(0.0, 1.0))
+        if part < LEAST_WATER:
+            name = column.removeprefix("disc_water_")
+            yield (
+                f"{100.0 * part:.0f} % of the disc of thruster '{name}' were water in frame "
+                f"{frame:.0f}, which had the whole thrust; put it farther from bodies, or "
+                "enlarge [domain] if it is at a side"
+            )

@@ -18,6 +18,7 @@ from flowborne.scenes.control import controller_of
 from flowborne.scenes.earlier import earlier_joints
 from flowborne.scenes.fluid import fluid_of, with_window
 from flowborne.scenes.schema import Scene
+from flowborne.scenes.thrusters import thrusters_of
 from flowborne.solids.model import SolidModel
 from flowborne.solids.wind import Wind
 
@@ -90,7 +91,9 @@ def build(scene: Scene, executor: Mapper | None = None) -> Built:
     start = initial_state(scene, model)
     winds, controller = _acting(scene, model, executor or Serial())
     fluid = with_window(fluid_of(scene), scene, model, start.q)
-    setup = Setup(model, fluid, motions, winds, mouths_of(scene, model))
+    forces = tuple(table.build(scene.constants) for table in scene.force)
+    thrusters = thrusters_of(scene.thruster, model, scene.constants)
+    setup = Setup(model, fluid, motions, winds, forces, mouths_of(scene, model), thrusters)
     world = World.at_rest(setup)
     world.solid = start
     if world.fluid is not None and scene.fluid is not None:

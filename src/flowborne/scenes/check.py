@@ -21,6 +21,7 @@ from flowborne.scenes.fluid import check_dimensions, check_fluid, check_followed
 from flowborne.scenes.motions import MotionFormulaTable, check_formulas, check_motions
 from flowborne.scenes.mouths import check_mouth_cells, check_mouths
 from flowborne.scenes.schema_bodies import ROOT, ClipTable, named_holds
+from flowborne.scenes.thrusters import check_discs, check_thrusters, thrusters_of
 from flowborne.solids.loops import tied_joints
 from flowborne.solids.model import HINGE, SLIDE, SolidModel, joint_kind, joint_unit
 from flowborne.solids.surfaces import geom_boxes
@@ -62,11 +63,16 @@ def cross_check(draft: Draft) -> list[str]:
     mouths = check_mouths(draft, scene.mouths, coupling, around)
     tables = scene.control, scene.objectives, scene.controller
     control = check_control(draft, *tables, scene.frame_time, around)
-    problems += [*check_bodies(draft, around), *mouths, *control]
-    if problems or not scene.mouths or draft.broken:
+    thrusters = check_thrusters(draft, scene.thruster, coupling, around)
+    problems += [*check_bodies(draft, around), *mouths, *thrusters, *control]
+    if problems or not (scene.mouths or scene.thruster) or draft.broken:
         return problems
     setup, start = Setup(model, fluid_of(scene)), initial_state(scene, model)
-    return list(check_mouth_cells(draft, mouths_of(scene, model), setup, start))
+    discs = thrusters_of(scene.thruster, model, scene.constants)
+    return [
+        *check_mouth_cells(draft, mouths_of(scene, model), setup, start),
+        *check_discs(draft, discs, setup, start),
+    ]
 
 
 NEEDS_BODIES = (
@@ -79,7 +85,9 @@ NEEDS_BODIES = (
     "motion",
     "actuator",
     "wind",
+    "force",
     "mouths",
+    "thruster",
     "control",
     "objectives",
     "controller",
@@ -118,8 +126,11 @@ def check_bodies(draft: Draft, around: Surroundings) -> Iterator[str]:
     named += check_followed(draft, around)
     for index, wind in enumerate(scene.wind):
         named += draft.said(wind.check(around), "wind", index)
+    for index, force in enumerate(scene.force):
+        named += draft.said(force.check(around), "force", index)
     if scene.policy is not None:
-        named += draft.said(scene.policy.check(around), "policy")
+        thrusters = [t.named(number) for number, t in enumerate(scene.thruster, start=1)]
+        named += draft.said(scene.policy.check(around, thrusters), "policy")
     yield from named
     state = [
         *check_initial(draft, around),
@@ -217,10 +228,16 @@ def _formulas(draft: Draft) -> dict[str, str]:
     positions = [(n, m.position) for n, m in motions if isinstance(m, MotionFormulaTable)]
     factors = [(n, mouth.factor) for n, mouth in mouths if mouth.factor is not None]
     controls = [(n, table.formula) for n, table in enumerate(draft.scene.actuator)]
+    forces = [
+        (n, *formula) for n, force in enumerate(draft.scene.force) for formula in force.formulas()
+    ]
+    thrusts = [(n, *thruster.setting) for n, thruster in enumerate(draft.scene.thruster)]
     return (
         {draft.at("motion", n, "position"): text for n, text in positions}
         | {draft.at("mouths", n, "factor"): text for n, text in factors}
         | {draft.at("actuator", n, "value"): text for n, text in controls if text is not None}
+        | {draft.at("force", n, key, place): text for n, key, place, text in forces}
+        | {draft.at("thruster", n, key): text for n, key, text in thrusts if isinstance(text, str)}
     )
 
 

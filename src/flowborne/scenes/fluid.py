@@ -24,7 +24,7 @@ from flowborne.scenes.schema import Scene
 from flowborne.scenes.sides import DyeValue, InflowSide, check_outlet, check_sides
 from flowborne.solids.model import SolidModel
 
-NEEDS_DOMAIN = ("fluid", "boundaries", "sources", "mouths", "dye")
+NEEDS_DOMAIN = ("fluid", "boundaries", "sources", "mouths", "thruster", "dye")
 
 
 def fluid_of(scene: Scene) -> Fluid | None:

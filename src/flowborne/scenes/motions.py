@@ -245,6 +245,8 @@ def check_formulas(
     for name in constants:
         if name in RESERVED or not name.isidentifier():
             yield f"{places.at('constants')}: '{name}' cannot be a constant's name. Change it."
-        elif not (wrong or name in used) and places.sound("motion", "actuator", "mouths"):
+        elif not (wrong or name in used) and places.sound(
+            "motion", "actuator", "mouths", "force", "thruster"
+        ):
             end = suggestion(name, used, "They use")
             yield f"{places.at('constants')}: no formula uses '{name}'{end}"

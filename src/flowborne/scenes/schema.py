@@ -31,6 +31,7 @@ from flowborne.scenes.control import ControllerTable, ControlTable
 from flowborne.scenes.domain import Domain, FluidTable
 from flowborne.scenes.dye import DyeTable, SourceTable
 from flowborne.scenes.flesh import FleshTable
+from flowborne.scenes.force import ForceTable
 from flowborne.scenes.motions import EarlierTable, MotionTable
 from flowborne.scenes.mouths import MouthTable
 from flowborne.scenes.policy import PolicyTable
@@ -43,6 +44,7 @@ from flowborne.scenes.schema_bodies import (
 )
 from flowborne.scenes.schema_film import FilmTable
 from flowborne.scenes.sides import BoundariesTable
+from flowborne.scenes.thrusters import ThrusterTable
 from flowborne.scenes.wind import WindTable
 
 
@@ -128,7 +130,8 @@ class Scene(Table):
     figure       figure or section of the paper, or the case
     dimensions   2: a slab one cell thick, everything per unit depth; 3
     gravity      m/s^2
-    constants    name -> number, for the formulas of [[motion]], [[actuator]] and [[mouths]]
+    constants    name -> number, for the formulas of [[motion]], [[actuator]], [[mouths]], [[force]]
+                 and [[thruster]]
     plugins      Python files in the scene's folder that register parts of the user
     """
 
@@ -155,7 +158,9 @@ class Scene(Table):
     motion: tuple[MotionTable, ...] = ()
     actuator: tuple[ActuatorTable, ...] = ()
     wind: tuple[WindTable, ...] = ()
+    force: tuple[ForceTable, ...] = ()
     mouths: tuple[MouthTable, ...] = ()
+    thruster: tuple[ThrusterTable, ...] = ()
     control: tuple[ControlTable, ...] = ()
     objectives: tuple[AnyObjective, ...] = ()
     controller: ControllerTable = ControllerTable()
@@ -237,12 +242,14 @@ class Scene(Table):
     def can_settle(self) -> bool:
         """Whether the optimum of the objectives does not depend on time.
 
-        It does with a clip, an earlier run, a moving joint, a mouth, an actuator, a plan of several
-        knots, phases, changes, a policy, or an objective with a reference motion.
+        It does with a clip, an earlier run, a moving joint, a mouth, an actuator, a thruster, a
+        force that changes, a plan of several knots, phases, changes, a policy, or an objective with
+        a reference motion.
         """
         moved = self.clip is not None or self.earlier is not None or bool(self.mouths)
         moved |= not all(table.rests for table in self.motion)
         moved |= bool(self.actuator) or bool(self.changes) or self.policy is not None
+        moved |= bool(self.thruster) or not all(table.rests for table in self.force)
         planned = self.controller.knots is not None
         phased = any(table.in_phases for table in self.control)
         return not (moved or planned or phased) and all(

@@ -24,6 +24,7 @@ from flowborne.scenes.motions import ServoPDTable
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.warn_bodies import (
     bodies_not_met,
+    discs_not_met,
     fixed_outside,
     floors_in_fluid,
     implausible_density,
@@ -170,6 +171,7 @@ WARNINGS: tuple[Warn, ...] = (
     past_stops,
     lying,
     unlike_the_sea,
+    discs_not_met,
 )
 """In the order in which they are listed."""
 

@@ -9,11 +9,13 @@ import numpy as np
 
 from flowborne.base.phrases import and_more, listed, rounded_down, rounded_up
 from flowborne.coupling.world import Fluid, Setup
+from flowborne.runs.summary import LEAST_WATER
 from flowborne.scenes.bodies import initial_state
 from flowborne.scenes.creature import counted_bodies, creature_extent, displaced_mass, unmet_bodies
 from flowborne.scenes.domain import Domain, fits_memory
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.seen import Seen, seen_bodies
+from flowborne.scenes.thrusters import parts_of_water
 from flowborne.solids.enclosed import enclosing_geoms
 from flowborne.solids.geoms import floors, geom_name, kind_of, rest_poses
 from flowborne.solids.model import SolidModel
@@ -279,4 +281,27 @@ def floors_in_fluid(scene: Scene, setup: Setup) -> Iterator[str]:
                 f"[domain]: the {kind} '{geom_name(mj, geom)}' lies inside the fluid, which flows "
                 "through it; a domain that ends there has a solid side, and a box in the model is "
                 "met"
+            )
+
+
+def discs_not_met(scene: Scene, setup: Setup) -> Iterator[str]:
+    """Thrusters with a disc that the grid does not resolve, or that is mostly no water."""
+    if setup.fluid is None or not setup.thrusters:
+        return
+    coarse = [t for t in setup.thrusters if t.radius < setup.fluid.grid.spacing]
+    if coarse:
+        least = min(thruster.radius for thruster in coarse)
+        names = listed([thruster.name for thruster in coarse])
+        yield (
+            f"[[thruster]]: the disc of {names} is less than two cells across, so that its jet is "
+            f"wider and slower than it should be; cells of {least:.3g} m resolve it"
+        )
+    start = initial_state(scene, setup.solid)
+    parts = parts_of_water(setup.thrusters, setup, start)
+    for thruster, part in zip(setup.thrusters, parts, strict=True):
+        if isinstance(part, float) and part < LEAST_WATER:
+            yield (
+                f"[[thruster]]: {100.0 * part:.0f} % of the disc of '{thruster.name}' are water, "
+                "which has the whole thrust, as the rest is in a body or outside the domain; a "
+                "place farther out makes it a whole disc"
             )

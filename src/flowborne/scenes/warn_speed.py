@@ -10,7 +10,9 @@ import numpy as np
 
 from flowborne.base.tables import MOST_STEPS
 from flowborne.coupling.mouths import Mouth
+from flowborne.coupling.thrusters import Thruster
 from flowborne.coupling.world import Setup
+from flowborne.fluid.sides.far import Strength
 from flowborne.fluid.transport import EXTRAPOLATION_COURANT
 from flowborne.kernels.arrays import Array
 from flowborne.motion.tracks import SPEED_SAMPLES
@@ -62,6 +64,10 @@ def fast_flow(scene: Scene, setup: Setup) -> Iterator[str]:
         return
     h = setup.fluid.grid.spacing
     speeds = [*_streams(scene), *((m.name, _jet(m, scene)) for m in setup.mouths)]
+    density = setup.fluid.density
+    speeds += [
+        (f"the jet of thruster '{t.name}'", _slipstream(t, scene, density)) for t in setup.thrusters
+    ]
     who, speed = max(speeds, key=lambda each: each[1])
     yield from _said(scene, lambda dt: (who, speed * dt / h), FLOW_CELLS)
 
@@ -207,9 +213,26 @@ def _added(velocity: tuple[float, ...]) -> float:
 
 def _jet(mouth: Mouth, scene: Scene) -> float:
     """Largest mean speed at a mouth at times of the run, m/s."""
-    area = 2.0 * mouth.radius if scene.is_slab else math.pi * mouth.radius**2
-    factor = 0.0
+    area = mouth.area(scene.is_slab)
+    factor = max(map(abs, _values(mouth.strength, scene)))
+    return factor * abs(mouth.volume_rate) / area if area > 0.0 else math.inf
+
+
+def _slipstream(thruster: Thruster, scene: Scene, density: float) -> float:
+    """Largest speed of the jet of a thruster at rest, sqrt(2 T / rho A), m/s: at times of the run,
+    or where a policy tells it at the ends of its range."""
+    told = scene.policy is not None and thruster.name in scene.policy.thrusters
+    settings = thruster.limits if told else _values(thruster.setting, scene)
+    slab, radius = scene.is_slab, thruster.radius
+    thrusts = [abs(thruster.thrust(s, density, slab)) for s in settings if math.isfinite(s)]
+    thrust = max(thrusts, default=0.0)
+    return math.sqrt(2.0 * thrust / density / (2.0 * radius if slab else math.pi * radius**2))
+
+
+def _values(strength: Strength, scene: Scene) -> list[float]:
+    """A strength at times of the run; 0 from where it is no number."""
+    values = [0.0]
     with suppress(ArithmeticError):
         for time in np.linspace(0.0, scene.time.frames * scene.frame_time, SPEED_SAMPLES):
-            factor = max(factor, abs(mouth.strength.at(float(time))))
-    return factor * abs(mouth.volume_rate) / area if area > 0.0 else math.inf
+            values.append(strength.at(float(time)))
+    return values

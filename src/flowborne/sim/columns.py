@@ -73,6 +73,13 @@ class Columns:
                                                 acceleration; both together are the whole force
       effort                                    |drive force| dt over the controlled dofs, N m s
       work_J                                    that the drives did in the frame
+      applied_force_<body>_x_N … _z_N           sum of the forces from outside on each body on which
+      applied_torque_<body>_x_Nm … _z_Nm        some act, and torque about its centre of mass
+      momentum_applied_x_Ns … _z_Ns             impulse of all these forces in the frame
+      thrust_<thruster>_N                       of each thruster on its body
+      jet_power_<thruster>_W                    that it gives to body and water: thrust times the
+                                                speed with which water goes through it
+      disc_water_<thruster>                     part of its disc that is water
       flesh_least_detF, flesh_inside_out        least volume of an element over that at rest, number
                                                 of elements inside out, in scenes with flesh
       <body>_x_m … _z_m, <body>_qw … _qz        pose of every body
@@ -99,6 +106,7 @@ class Columns:
         joints: bool | tuple[str, ...] = True,
         told: tuple[str, ...] = (),
         actuators: tuple[str, ...] = (),
+        pushed: tuple[str, ...] = (),
     ) -> None:
         self._controller = controller
         dofs = np.zeros(0, np.int64) if controller is None else controller.dofs
@@ -110,6 +118,7 @@ class Columns:
             Quantity(sensor_columns(setup.solid), sensor_values, False),
             *of_objective(controller),
             *of_forces(stream, dofs),
+            *of_applied(setup, pushed),
             *of_bodies(setup.solid, bodies),
             *of_fluid(setup),
         )
@@ -289,6 +298,45 @@ def of_forces(stream: tuple[float, ...] | None, controlled: Integers) -> Iterato
     yield Quantity(names, forces, splits=True)
     yield Quantity(["effort"], effort)
     yield of_steps("work")
+
+
+def of_applied(setup: Setup, told: tuple[str, ...]) -> Iterator[Quantity]:
+    """Forces from outside on bodies, those that a policy pushes among them, and their impulse;
+    thrusters."""
+    model = setup.solid
+    found = {*told, *(force.body for force in setup.forces)}
+    found |= {model.body_names[thruster.body] for thruster in setup.thrusters}
+    names = [name for name in model.body_names if name in found]
+    if not names:
+        return
+    pushed = [model.body(name) for name in names]
+    kinds = ("force", "N"), ("torque", "Nm")
+    yield Quantity(
+        [
+            f"applied_{of}_{name}_{axis}_{unit}"
+            for name in names
+            for of, unit in kinds
+            for axis in "xyz"
+        ],
+        lambda frame: frame.applied()[pushed].ravel().tolist(),
+    )
+    yield Quantity(
+        [f"momentum_applied_{axis}_Ns" for axis in "xyz"],
+        lambda frame: sum(step.dt * step.applied_wrench[:, :3].sum(axis=0) for step in frame.steps),
+    )
+    thrusters = [thruster.name for thruster in setup.thrusters]
+    yield Quantity(
+        [f"thrust_{name}_N" for name in thrusters],
+        lambda frame: frame.mean(lambda step: step.thrust).tolist(),
+    )
+    yield Quantity(
+        [f"jet_power_{name}_W" for name in thrusters],
+        lambda frame: frame.mean(lambda step: step.jet_power).tolist(),
+    )
+    yield Quantity(
+        [f"disc_water_{name}" for name in thrusters],
+        lambda frame: frame.mean(lambda step: step.disc_water).tolist(),
+    )
 
 
 def of_bodies(model: SolidModel, named: tuple[str, ...]) -> Iterator[Quantity]:

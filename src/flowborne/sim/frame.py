@@ -59,6 +59,11 @@ class FrameReport:
         time = sum(step.dt for step in self.steps)
         return np.asarray(sum(step.dt * of(step) for step in self.steps) / time)
 
+    def applied(self) -> Array:
+        """(nbody, 6) mean force and torque from outside on the bodies about their centres of mass,
+        N and N m; those of fluid and winds are not among them."""
+        return self.mean(StepReport.central_applied)
+
     def power(self) -> Array:
         """(nv,) mean power of the drives, W."""
         return self.mean(lambda step: step.actuator * step.velocity)

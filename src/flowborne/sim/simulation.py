@@ -116,7 +116,8 @@ class Simulation:
         self.frames = built.frames
         output, stream = self.scene.output, self.scene.stream()
         model, actuators = built.world.setup.solid, self.scene.told_actuators()
-        told = () if self.scene.policy is None else self.scene.policy.joints
+        policy = self.scene.policy
+        told, pushed = ((), ()) if policy is None else (policy.joints, policy.bodies)
         told += joints_of_actuators(model, actuators)
         self.columns = Columns(
             built.world.setup,
@@ -126,11 +127,12 @@ class Simulation:
             output.joints,
             told,
             actuators,
+            pushed,
         )
         self._controls = scene_controls(self.scene.actuator, model, self.scene.constants)
         self._changes: tuple[ChangeTable, ...] = self.scene.changes
         self._values: dict[str, Any] = {}
-        self._policy = None if self.scene.policy is None else self.scene.policy.build()
+        self._policy = None if policy is None else policy.build()
         self._moment = Snapshot(built.world, 0, None)
         self._started = False
         self._step: Step = step
@@ -202,8 +204,9 @@ class Simulation:
     def advance_frame(self, commands: Commands | None = None) -> FrameReport:
         """Decide, then take the steps of one frame, on all cores unless a context allows fewer.
 
-        commands  what joints are told by their names: Position, Velocity or Torque. The scene's
-                  motions and its controller move the others. By default the scene's policy tells
+        commands  what joints are told by their names: Position, Velocity or Torque; thrusters:
+                  Control; and a Force by a name of its own. The scene's motions and its controller
+                  move the other joints. By default the scene's policy tells
         raises    BlowUpError if a step or the policy fails or a measure is not a finite number;
                   SceneError for a wrong command. After any error the state is that before the frame
         """

@@ -7,13 +7,14 @@ muscles", which the paper uses.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
 
 from flowborne.kernels.arrays import Array, Integers, Mask
+from flowborne.solids.force import Force
 from flowborne.solids.model import SolidModel
 from flowborne.solids.motors import Controls
 
@@ -242,6 +243,8 @@ class Told:
     force     (k,) N m or N
     controls  of actuators, None where none has one
     servos    actuators that drive a joint as its servo, and its dof
+    forces    on bodies, besides those of the setup
+    settings  of thrusters by name, in place of their own
     """
 
     motions: tuple[Trajectory, ...]
@@ -249,6 +252,8 @@ class Told:
     force: Array
     controls: Controls | None = None
     servos: Sequence[tuple[int, int]] = ()
+    forces: tuple[Force, ...] = ()
+    settings: Mapping[str, float] = field(default_factory=dict)
 
     def force_on(self, nv: int) -> Array:
         """(nv,) generalised force."""
