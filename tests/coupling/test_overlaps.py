@@ -128,12 +128,12 @@ def test_torques_in_a_closed_tank_bend_as_in_one_with_an_open_side(
     monkeypatch.setattr(
         steps, "equations", lambda w, b, force, *rest: equations(w, b, force + torque, *rest)
     )
-    closed, one_open = eel("no-slip"), eel("open")
+    closed, one_open = eel("no-slip"), eel("open")  # of joints that stop at 20 degrees
     for world in (closed, one_open):
         for _ in range(5):
             assert step(world, 1.0 / 60.0).outcome is Outcome.DONE
     bend = np.degrees(closed.solid.q[FREE])
-    assert np.abs(bend).min() > 20.0
+    assert np.abs(bend).min() > 19.0
     np.testing.assert_allclose(bend, np.degrees(one_open.solid.q[FREE]), atol=0.1)
 
 

@@ -9,6 +9,7 @@ from flowborne.solids.driven import drive, within_limits
 from flowborne.solids.dynamics import SolidSystem, assemble
 from flowborne.solids.model import SolidModel, SolidState
 from flowborne.solids.prescribed import Driven
+from flowborne.solids.trajectories import JointCommand
 
 WHEEL = """<mujoco><worldbody><body><joint axis="0 0 1" range="-45 45" {stop}/>
 <geom type="cylinder" size=".1 .05" mass="2"/></body></worldbody></mujoco>"""
@@ -92,11 +93,12 @@ def test_a_drive_of_limited_torque_ends_at_its_stop() -> None:
     """It pushes on with its limit, 0.5 N m, where the stop keeps it from its velocity."""
     model = SolidModel.from_string(WHEEL.format(stop=""), gravity=(0.0, 0.0, 0.0))
     state, limit, none, dt = model.rest(), np.array([0.5]), np.zeros(1), 1e-3
-    state.v[0] = 5.0
+    state.v[0], command = 5.0, JointCommand.none(1)
+    command.set(np.array([0]), 5.0, 5.0, 0.5)
     for _ in range(400):
         before = state.copy()
         state.q = model.integrate(state.q, state.v, dt)
-        turns = drive(model, state, none, dt, before, np.array([True]), np.array([5.0]), limit)
+        turns = drive(model, state, none, dt, before, command)
         found: Driven | None = turns
         while found is not None:
             turns, v = found, found.velocity
