@@ -215,6 +215,8 @@ def test_a_vehicle_is_told_by_its_thrusters() -> None:
     env = SceneEnv(coarse("rov"))
     assert env.action_space.shape == (8,)
     assert env.observed[-7:] == ("offset_x_m", "offset_y_m", "offset_z_m", "qw", "qx", "qy", "qz")
+    with pytest.raises(ValueError, match=r"\(8,\), .*each of front_left, .* and this one \(7,\)"):
+        env.step(np.zeros(7))
     first, _ = env.reset(seed=1)
     assert first[-7:].tolist() == [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
     for _ in range(4):

@@ -87,8 +87,8 @@ class Sweeps:
             parts = np.linalg.lstsq(changes, self.steps[-1], rcond=ROUNDING)[0]
             ahead = ahead - (moves + changes) @ parts
         weight = self.weight.ravel()
-        found = np.divide(ahead, weight, out=np.zeros(ahead.size), where=weight > 0.0)
-        return found.reshape(pressure.shape)
+        unweighted = np.divide(ahead, weight, out=np.zeros(ahead.size), where=weight > 0.0)
+        return unweighted.reshape(pressure.shape)
 
     def forget(self) -> None:
         """Begin anew, as the bodies answer otherwise now."""

@@ -211,8 +211,8 @@ class StepReport:
     contacts: Annotated[int, Joined(last, max)] = 0
     fastest: Annotated[float, Joined(max, max, "m/s")] = 0.0
     seconds: Annotated[dict[str, float], Joined(last)] = field(default_factory=dict)
-    output: Mean = field(default_factory=partial(np.zeros, 0))
-    output_power: Mean = field(default_factory=partial(np.zeros, 0))
+    output: Mean = field(default_factory=no_values)
+    output_power: Mean = field(default_factory=no_values)
     limited: Annotated[Integers, Joined(union)] = field(default_factory=no_dofs)
     unsettled: Annotated[Integers, Joined(last)] = field(default_factory=no_dofs)
 

@@ -229,7 +229,8 @@ class ViscousSystem:
         self.wraps = np.array(grid.shape) * np.array(boundaries.periodic())
         self.diagonal = np.concatenate([system.diagonal.ravel() for system in systems])
         unknown = self.diagonal > 0.0
-        self.scale = np.where(unknown, 1.0 / np.sqrt(np.where(unknown, self.diagonal, 1.0)), 0.0)
+        self.root = np.sqrt(self.diagonal)
+        self.scale = np.divide(1.0, self.root, out=np.zeros(self.root.size), where=unknown)
         self.most = MOST * max(MOST, *grid.shape)
         self.couples = walls.couples(bodies)
         self.answer_by(answering)
@@ -281,7 +282,7 @@ class ViscousSystem:
         given, found = residual.reshape(-1), out.reshape(-1)
         for system, cycle in zip(self.systems, self.cycles, strict=True):
             part = system.part
-            root = np.sqrt(self.diagonal[part]).reshape(system.kind.shape)
+            root = self.root[part].reshape(system.kind.shape)
             found[part] = (root * cycle.times(root * given[part].reshape(root.shape))).ravel()
         return out
 
@@ -308,7 +309,7 @@ class ViscousSystem:
         np.add.at(rhs, walls.index, walls.weight @ (self.at_walls(twist + known) + blown))
         right = spread(self.scale * rhs)
         guess = start if self.last is None else self.last
-        y = spread(np.where(unknown, guess, 0.0) * np.sqrt(self.diagonal))
+        y = spread(np.where(unknown, guess, 0.0) * self.root)
         guide = self.precondition if self.cycles else None
         converged = conjugate_gradients(self.apply, right, y, tolerance, self.most, guide)
         result = np.where(unknown, self.scale * y.reshape(-1)[: start.size], start)

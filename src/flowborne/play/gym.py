@@ -154,9 +154,10 @@ class SceneEnv(gymnasium.Env):  # type: ignore[name-defined]
         """
         if np.shape(action) != self._low.shape:
             model = self.simulation.setup.solid
-            dofs = [model.dof_names[dof] for j in self._joints for dof in model.dofs_of(j)]
+            told = [model.dof_names[dof] for j in self._joints for dof in model.dofs_of(j)]
+            told += [*self._actuators, *self._thrusters]
             raise ValueError(
-                f"an action has the shape {self._low.shape}, a number for each of {listed(dofs)}, "
+                f"an action has the shape {self._low.shape}, a number for each of {listed(told)}, "
                 f"and this one {np.shape(action)}. Give it that shape."
             )
         simulation, rewards, info = self.simulation, list[float](), dict[str, Any]()

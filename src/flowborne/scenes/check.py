@@ -135,7 +135,7 @@ def check_bodies(draft: Draft, around: Surroundings) -> Iterator[str]:
     state = [
         *check_initial(draft, around),
         *check_motions(draft, draft.scene.motion, around),
-        *check_actuators(draft, scene.actuator, _moved(draft), around),
+        *check_actuators(draft, scene.actuator, _moved(draft, model), around),
         *check_formulas(draft, _formulas(draft), scene.constants, scene.frame_times()),
     ]
     yield from state
@@ -241,12 +241,12 @@ def _formulas(draft: Draft) -> dict[str, str]:
     )
 
 
-def _moved(draft: Draft) -> dict[str, str]:
+def _moved(draft: Draft, model: SolidModel) -> dict[str, str]:
     """Joints that something else than an actuator moves -> what does, in words."""
     scene = draft.scene
-    hold = () if scene.solids is None or isinstance(scene.solids.hold, bool) else scene.solids.hold
+    held = dict.fromkeys(named_holds(scene.solids, model), "in [solids] hold")
     earlier = dict.fromkeys(earlier_joints(scene), "moved by the [earlier] run")
-    return dict.fromkeys(hold, "in [solids] hold") | earlier | scene.moved_joints()
+    return held | earlier | scene.moved_joints()
 
 
 def check_clip(draft: Draft) -> Iterator[str]:

@@ -13,7 +13,7 @@ from pydantic import Field, model_validator
 from flowborne.base.phrases import suggestion
 from flowborne.base.tables import Number, Places, Positive, Text, Vector, triple
 from flowborne.control.surroundings import Surroundings
-from flowborne.coupling.cut import cut_by_bodies, discs_at, pose_and_cut, volumes_of
+from flowborne.coupling.cut import discs_at, pose_and_cut, volumes_of
 from flowborne.coupling.thrusters import Thruster
 from flowborne.coupling.world import Setup, World
 from flowborne.fluid.sides.far import Strength
@@ -191,7 +191,8 @@ def parts_of_water(
     """Which part of the disc of each thruster is water at the start; a sentence where none is."""
     world = World.at_rest(setup)
     world.solid = start
-    pose, volumes = pose_and_cut(world)[0], volumes_of(world, cut_by_bodies(world))
+    pose, cut = pose_and_cut(world)
+    volumes = volumes_of(world, cut)
     for thruster in thrusters:
         world.setup = setup.but(thrusters=(thruster,))
         try:

@@ -52,14 +52,17 @@ def hidden_geoms(model: SolidModel) -> Mask:
     return model.geom_covered | ((hull >= 0) & (weld == weld[hull]))
 
 
+def tied_bodies(mj: mujoco.MjModel, number: int) -> list[int]:
+    """The two bodies that an equality ties to each other, by sites or not; none of another kind."""
+    if mj.eq_type[number] not in PAIRS:
+        return []
+    pair = int(mj.eq_obj1id[number]), int(mj.eq_obj2id[number])
+    return [int(mj.site_bodyid[n]) if mj.eq_objtype[number] == SITE else n for n in pair]
+
+
 def tied_roots(mj: mujoco.MjModel) -> set[int]:
     """Bodies on the world that an equality or a tendon ties to another one, or to the world."""
-    ends: list[set[int]] = []
-    for kind, object_kind, *pair in zip(
-        mj.eq_type, mj.eq_objtype, mj.eq_obj1id, mj.eq_obj2id, strict=True
-    ):
-        if kind in PAIRS:
-            ends.append({int(mj.site_bodyid[n] if object_kind == SITE else n) for n in pair})
+    ends = [set(tied_bodies(mj, number)) for number in range(mj.neq)]
     for first, count in zip(mj.tendon_adr, mj.tendon_num, strict=True):
         wraps = range(first, first + count)
         sites = [n for n in wraps if mj.wrap_type[n] == SITE_OF_TENDON]

@@ -17,7 +17,7 @@ from flowborne.kernels.arrays import Array, Indices, Mask
 from flowborne.solids.constraints import rows_of
 from flowborne.solids.dynamics import System, centred
 from flowborne.solids.model import SolidModel, SolidState
-from flowborne.solids.momentum import Halfway
+from flowborne.solids.momentum import Halfway, tendon_jacobian
 from flowborne.solids.scratch import Scratch, scratch
 
 
@@ -150,7 +150,5 @@ def _jointed(
 
 def _tendons(s: Scratch, strength: Array, active: Indices) -> csr_array:
     """Sum of strength J^T J over the active tendons."""
-    mj, data = s.mj, s.data
-    start = np.concatenate([[0], np.cumsum(mj.ten_J_rownnz, dtype=np.int64)])
-    J = csr_array((data.ten_J.copy(), mj.ten_J_colind, start), (mj.ntendon, mj.nv))[active]
+    J = tendon_jacobian(s)[active]
     return csr_array(J.T @ diags_array(strength) @ J)

@@ -7,10 +7,9 @@ from collections.abc import Iterator
 import mujoco
 import numpy as np
 
+from flowborne.solids.enclosed import tied_bodies
 from flowborne.solids.geoms import element_name
 from flowborne.solids.model import SolidModel
-
-SITE = int(mujoco.mjtObj.mjOBJ_SITE)
 
 
 def active_equalities(mj: mujoco.MjModel) -> Iterator[tuple[int, str]]:
@@ -26,18 +25,15 @@ def tied_joints(model: SolidModel) -> dict[str, str]:
     These are the joints of each loop that a <connect> or <weld> closes, those between one of its
     two bodies and the other, and the joints that follow another one by a <joint>.
     """
-    mj, kinds, found = model.mj, mujoco.mjtEq, {}
+    mj, found = model.mj, {}
     for number, name in active_equalities(mj):
         first, second = int(mj.eq_obj1id[number]), int(mj.eq_obj2id[number])
-        kind = int(mj.eq_type[number])
-        if kind == kinds.mjEQ_JOINT and second >= 0:
+        if mj.eq_type[number] == mujoco.mjtEq.mjEQ_JOINT and second >= 0:
             leader = model.joint_names[second]
             found[model.joint_names[first]] = f"tied to '{leader}' by the equality '{name}'"
-        if kind not in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD):
-            continue
-        if mj.eq_objtype[number] == SITE:
-            first, second = int(mj.site_bodyid[first]), int(mj.site_bodyid[second])
-        loop = _above(mj, first) ^ _above(mj, second)
+        loop = set[int]()
+        for body in tied_bodies(mj, number):
+            loop ^= _above(mj, body)
         for joint in np.flatnonzero(np.isin(mj.jnt_bodyid, list(loop))).tolist():
             found[model.joint_names[joint]] = f"in the loop that the equality '{name}' closes"
     return found

@@ -101,9 +101,15 @@ def tendon_inertia(s: Scratch) -> csr_array | None:
             armature[mj.actuator_trnid[actuator, 0]] += gear**2 * mj.actuator_armature[actuator]
     if not armature.any():
         return None
-    start = np.concatenate([[0], np.cumsum(mj.ten_J_rownnz, dtype=np.int64)])
-    J = csr_array((s.data.ten_J.copy(), mj.ten_J_colind, start), (mj.ntendon, mj.nv))
+    J = tendon_jacobian(s)
     return csr_array(J.T @ diags_array(armature) @ J)
+
+
+def tendon_jacobian(s: Scratch) -> csr_array:
+    """(tendons, nv) derivative of the tendons' lengths by the dofs, at the pose in `s`."""
+    mj = s.mj
+    start = np.concatenate([[0], np.cumsum(mj.ten_J_rownnz, dtype=np.int64)])
+    return csr_array((s.data.ten_J.copy(), mj.ten_J_colind, start), (mj.ntendon, mj.nv))
 
 
 def kinetic_energy(model: SolidModel, state: SolidState) -> float:
