@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 # Every process would compile the package anew, a fifth of what it takes to start.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: baselines closeness demo lint test browser dist docs gltf-validator imports failing same-figures gallery paper exporters fuzz messages size strangers validation-page clean
+.PHONY: baselines chapters closeness demo lint test browser dist docs gltf-validator imports failing films same-figures gallery paper exporters fuzz messages size speed strangers validation-page clean
 
 demo: $(VENV)/installed
 	$(BIN)/flowborne run ns-block-drag-max --out runs/ns-block-drag-max --replace
@@ -40,6 +40,12 @@ imports: $(VENV)/installed-test
 failing: $(VENV)/installed-test
 	$(BIN)/python tools/failing.py
 
+films: $(VENV)/installed-test
+	$(BIN)/python tools/films.py $(NAMES)
+
+chapters: $(VENV)/installed-test
+	$(BIN)/python tools/chapters.py
+
 gallery: $(VENV)/installed-test
 	$(BIN)/python tools/gallery.py $(NAMES)
 
@@ -48,6 +54,9 @@ paper: $(VENV)/installed-test
 
 validation-page: $(VENV)/installed-test
 	$(BIN)/python tools/validation_page.py
+
+speed: $(VENV)/installed-test
+	NUMBA_NUM_THREADS=1 $(BIN)/python tools/accuracy.py
 
 same-figures: $(VENV)/installed-test
 	rm -rf build/minute

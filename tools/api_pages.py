@@ -1,37 +1,63 @@
-"""The public face, page after page, for autodoc: the middle of docs/api.md."""
+"""The public face for autodoc: the parts of docs/api.md and of the pages in docs/api."""
 
 from __future__ import annotations
 
+import inspect
 from importlib import import_module
 
 import flowborne
+from markdown_text import table
 
-MODULES = (flowborne, *(import_module(f"flowborne.{name}") for name in flowborne.PAGES))
+FIRST = "Simulation"
+"""What stands before everything else."""
 
-PAGE = """## `{name}`
-
-```{{eval-rst}}
-.. automodule:: {name}
-   :members: {members}
-   :imported-members:
-```
+DIRECTIVE = """```{{eval-rst}}
+.. auto{kind}:: {module}.{name}
+{members}```
 """
 
 
-def page() -> str:
-    """A section for each public module; what several have is told in the first."""
-    text: list[str] = []
-    told: dict[int, str] = {}
-    for module in MODULES:
-        things = {name: getattr(module, name) for name in module.__all__}
-        here = [n for n, one in things.items() if documented(one) and id(one) not in told]
-        elsewhere = [(n, told[id(one)]) for n, one in things.items() if id(one) in told]
-        told.update({id(things[name]): module.__name__ for name in here})
-        text.append(PAGE.format(name=module.__name__, members=", ".join(here)))
-        if elsewhere:
-            said = ", ".join(f"`{name}` (see `{where}`)" for name, where in elsewhere)
-            text.append(f"Also here: {said}.\n")
+def modules() -> str:
+    """The public modules, each with what its docstring says first."""
+    rows = []
+    for name in ("flowborne", *(f"flowborne.{name}" for name in flowborne.PAGES)):
+        said = (import_module(name).__doc__ or "").splitlines()[0]
+        rows.append([f"[`{name}`](api/{name}.md)", said])
+    return table(("module", "what it has"), rows)
+
+
+def page(name: str) -> str:
+    """What a public module has: Simulation first, then functions, then classes."""
+    module = import_module(name)
+    things = {key: getattr(module, key) for key in module.__all__}
+    mine = {key: thing for key, thing in things.items() if documented(thing)}
+    here = {key: thing for key, thing in mine.items() if home(thing) == name}
+    order = sorted(here, key=lambda key: (key != FIRST, inspect.isclass(here[key])))
+    text = [inspect.cleandoc(module.__doc__ or "").splitlines()[0] + "\n"]
+    text += [directive(name, key, here[key]) for key in order]
+    elsewhere = [f"[`{key}`](#{home(mine[key])}.{key})" for key in mine if key not in here]
+    if elsewhere:
+        text.append(f"Also here: {', '.join(elsewhere)}.\n")
     return "\n".join(text)
+
+
+def directive(module: str, name: str, thing: object) -> str:
+    """The directive that documents a thing."""
+    is_class = inspect.isclass(thing)
+    kind = "class" if is_class else "function"
+    return DIRECTIVE.format(
+        kind=kind, module=module, name=name, members="   :members:\n" if is_class else ""
+    )
+
+
+def home(thing: object) -> str:
+    """The first public module that has a thing."""
+    names = ("flowborne", *(f"flowborne.{name}" for name in flowborne.PAGES))
+    return next(
+        name
+        for name in names
+        if any(getattr(import_module(name), key) is thing for key in import_module(name).__all__)
+    )
 
 
 def documented(thing: object) -> bool:

@@ -1,13 +1,15 @@
 """Sphinx extension of the documentation: parts made of the code, formulas without a network.
 
-A line `<!-- made by MODULE.FUNCTION -->` of a page becomes the Markdown that the function of a
-module in tools/ gives. Formulas become MathML, which browsers draw by themselves. Docstrings are
-read as they are written: single backticks, columns of names and meanings, indented formulas.
+A line `<!-- made by MODULE.FUNCTION ARGUMENTS -->` of a page becomes the Markdown that the function
+of a module in tools/ gives. Formulas become MathML, which browsers draw by themselves, and symbols
+of the method lead to their table. Docstrings are read as they are written: single backticks,
+columns of names and meanings, indented formulas.
 """
 
 from __future__ import annotations
 
 import re
+from html import escape
 from typing import Any
 
 from docutils import nodes
@@ -16,25 +18,39 @@ from pydantic import BaseModel
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
+import accuracy
 import api_pages
 import citation
 import command_help
 import parts
 import scene_keys
+import symbols
 import validation_table
 from docstrings import entries, paragraphs
 
 MAKERS = {
     module.__name__: module
-    for module in (api_pages, citation, command_help, parts, scene_keys, validation_table)
+    for module in (
+        accuracy,
+        api_pages,
+        citation,
+        command_help,
+        parts,
+        scene_keys,
+        symbols,
+        validation_table,
+    )
 }
 """Modules whose functions give parts of pages. They are imported before autodoc imports anything:
 it does so as type checkers do, which pydantic does not bear."""
 
-MADE = re.compile(r"^<!-- made by (\w+)\.(\w+) -->$", flags=re.MULTILINE)
+MADE = re.compile(r"^<!-- made by (\w+)\.(\w+)(.*) -->$", flags=re.MULTILINE)
 
 MARKUP = re.compile(r"(`[^`]+`)|([*|_\\])")
 """What stays as it is between backticks, and what would be markup elsewhere."""
+
+OF_METHOD = ("method/", "momentum")
+"""Beginnings of the names of pages whose formulas have the method's symbols."""
 
 PYDANTIC = ("model_config", "model_post_init")
 
@@ -45,13 +61,20 @@ def made_parts(app: Sphinx, name: str, source: list[str]) -> None:
     """Put what the code makes into a page."""
 
     def made(found: re.Match[str]) -> str:
-        return str(getattr(MAKERS[found[1]], found[2])())
+        return str(getattr(MAKERS[found[1]], found[2])(*found[3].split()))
 
     source[0] = MADE.sub(made, source[0])
 
 
 def inline_formula(self: Any, node: nodes.math) -> None:
-    self.body.append(tex2mathml(node.astext()))
+    """A formula; one that is a symbol of the method leads to the table of symbols."""
+    made, page = tex2mathml(node.astext()), self.builder.current_docname
+    symbol = symbols.symbol_of(node.astext())
+    if symbol is not None and page.startswith(OF_METHOD) and page != symbols.PAGE:
+        place = f"{self.builder.get_relative_uri(page, symbols.PAGE)}#{symbols.anchor(symbol)}"
+        said = escape(symbol.meaning.replace("$", ""))
+        made = f'<a class="symbol" href="{place}" title="{said}">{made}</a>'
+    self.body.append(made)
     raise nodes.SkipNode
 
 

@@ -10,6 +10,7 @@ from flowborne_validation.case import reference
 from flowborne_validation.report import Data, grid_of, read_report, tier_of
 from markdown_text import plain, table
 from marked import with_part
+from validation_table import link
 
 PAGE = ROOT / "docs" / "paper.md"
 
@@ -45,7 +46,7 @@ def section() -> str:
     """The table, and which run each case is from."""
     data = read_report(REPORT)
     rows = [
-        [figure, f"[{name}](validation.md#case-{name.lower()})", *row_of(finding)]
+        [figure, link(name), *row_of(finding)]
         for figure, name, begins in SHOWN
         for finding in found(data, name, begins)
     ]

@@ -11,9 +11,11 @@ from typing import Any, NamedTuple
 from failing import REPORT
 from flowborne_validation.page import curves_of, drag_over_reynolds, plots_of
 from flowborne_validation.report import Data, read_report, tier_of
+from tolerances import dots
+from tolerances import draw as draw_tolerances
 
-DRAG = "drag"
-"""Plot that several cases share."""
+DRAG, TOLERANCES = "drag", "tolerances"
+"""Plots that several cases share."""
 
 
 class Picture(NamedTuple):
@@ -32,8 +34,11 @@ class Picture(NamedTuple):
 
 
 def pictures(data: Data) -> dict[str, list[Picture]]:
-    """Plots of every case that has some, each in the tier that counts, and the one of DRAG."""
-    found: dict[str, list[Picture]] = {}
+    """Plots of every case that has some, each in the tier that counts, and the shared ones."""
+    shown = dots(data)
+    title = "all figures against their tolerance, a row for each family of cases"
+    drawn = partial(draw_tolerances, shown)
+    found = {TOLERANCES: [Picture(f"{TOLERANCES}.svg", title, digest(shown), drawn)]}
     drag = drag_over_reynolds(data)
     if drag:
         title = "drag of a cylinder over the Reynolds number"

@@ -10,7 +10,7 @@ from typing import Any
 from failing import REPORT, ROOT
 from failing import number as shown
 from flowborne.base.version import __version__
-from flowborne_validation.case import THE_RUN, entry
+from flowborne_validation.case import entry
 from flowborne_validation.report import (
     code,
     failures,
@@ -23,9 +23,10 @@ from flowborne_validation.report import (
     verdicts,
 )
 from markdown_text import plain, table
-from validation_page import DRAG, Picture, pictures
+from tolerances import FAMILIES, family_of, of_family, off
+from validation_page import Picture, pictures
 
-HEAD = ("", "figure", "flowborne", "reference", "accepted", "grid")
+HEAD = ("", "figure", "flowborne", "reference", "off", "accepted", "grid")
 VERDICTS = {
     "pass": "passes",
     "coarse": "*coarse*",
@@ -89,62 +90,78 @@ def git(*arguments: str) -> str:
 
 def failing() -> str:
     """What fails, each case in the tier that counts, that which is farthest off first."""
-    found = sorted(failures(read_report(REPORT)), key=lambda failed: -off(failed[2]))
-    rows = [
-        [
-            name,
-            tier,
-            plain(f["quantity"]),
-            number(f["value"]),
-            number(f["reference"]),
-            plain(str(f["tolerance"])),
-        ]
-        for name, tier, f in found
-    ]
+    found = sorted(failures(read_report(REPORT)), key=lambda failed: -distance(failed[2]))
+    rows = [[link(name), tier, *row_of(f)[1:-1]] for name, tier, f in found]
     return table(["case", "tier", *HEAD[1:-1]], rows)
 
 
-def off(finding: dict[str, Any]) -> float:
+def distance(finding: dict[str, Any]) -> float:
     """Distance from the reference over its size; infinite where that is 0, and of a broken run."""
-    if finding["quantity"] == THE_RUN:
-        return math.inf
-    value, reference = float(finding["value"]), float(finding["reference"])
-    return abs(value - reference) / abs(reference) if reference else math.inf
+    part = off(finding)
+    return math.inf if part is None else abs(part)
+
+
+def link(name: str) -> str:
+    """The id of a case, which leads to its section."""
+    return f"[{name}](validation-{family_of(name)}.md#case-{name.lower()})"
+
+
+def per_cent(finding: dict[str, Any]) -> str:
+    """How far a figure is off its reference; empty where that is 0 or a bound."""
+    part = off(finding)
+    return "" if part is None else signed(100.0 * part)
+
+
+def signed(percent: float) -> str:
+    """A deviation with its sign, to two digits or whole per cents."""
+    digits = 2 if abs(percent) < 1.0 else 1 if abs(percent) < 10.0 else 0
+    return f"{percent:+.{digits}f}\u00a0%" if abs(percent) >= 0.005 else "< 0.01\u00a0%"
+
+
+def row_of(found: dict[str, Any]) -> list[str]:
+    """A figure beside its reference, as HEAD has it."""
+    return [
+        VERDICTS[found["verdict"]],
+        plain(found["quantity"]),
+        number(found["value"]),
+        number(found["reference"]),
+        plain(per_cent(found)),
+        plain(str(found["tolerance"])),
+        plain(grid_of(found)),
+    ]
 
 
 def overview() -> str:
-    """A line for each case with its verdict, and the drag of cylinders over all cases."""
-    rows = []
+    """The families, and a line for each case of each with its verdict."""
     data = read_report(REPORT)
-    for name, tiers in data.items():
-        tier = tier_of(tiers)
-        found = [finding["verdict"] for finding in tiers[tier]["findings"]]
-        passed = f"{found.count('pass')} of {len(found)}"
-        title = f"[{name}](#case-{name.lower()}) {plain(entry(name).name)}"
-        rows.append([VERDICTS[verdict_of(tiers)], title, passed, tier])
-    drag = gallery(pictures(data).get(DRAG, []))
-    return table(["", "case", "figures that pass", "tier"], rows) + "\n" + drag
+    text = []
+    for page in FAMILIES:
+        rows = []
+        for name, tiers in of_family(data, page).items():
+            tier = tier_of(tiers)
+            found = [finding["verdict"] for finding in tiers[tier]["findings"]]
+            passed = f"{found.count('pass')} of {len(found)}"
+            title = f"{link(name)} {plain(entry(name).name)}"
+            rows.append([VERDICTS[verdict_of(tiers)], title, passed, tier])
+        text.append(f"**[](validation-{page}.md)**\n")
+        text.append(table(["", "case", "figures that pass", "tier"], rows))
+    return "\n".join(text)
 
 
-def cases() -> str:
+def shared(name: str) -> str:
+    """A plot that several cases share."""
+    return gallery(pictures(read_report(REPORT)).get(name, []))
+
+
+def family(page: str) -> str:
     """A section for each case: where its reference is from, its figures beside ours, its plots."""
     text = []
     data = read_report(REPORT)
     plots = pictures(data)
-    for name, tiers in data.items():
+    for name, tiers in of_family(data, page).items():
         tier, known = tier_of(tiers), entry(name)
         case: dict[str, Any] = tiers[tier]
-        rows = [
-            [
-                VERDICTS[found["verdict"]],
-                plain(found["quantity"]),
-                number(found["value"]),
-                number(found["reference"]),
-                plain(str(found["tolerance"])),
-                plain(grid_of(found)),
-            ]
-            for found in case["findings"]
-        ]
+        rows = [row_of(found) for found in case["findings"]]
         finest = "its finest grids" if is_finest(name, tier) else "not its finest grids"
         run = f"Tier {tier}, {finest}: {case['seconds']:g} s on {case['cores']} cores, "
         run += f"{case['date']}, version {case['version']}."

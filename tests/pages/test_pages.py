@@ -56,7 +56,6 @@ ELSEWHERE = {
     "python3 -m venv": "makes an environment; `make demo` does that",
     "python -m venv": "makes an environment for Blender, which is no part of the tests",
     "blender/bin/": "Blender is no part of the tests",
-    ".venv/bin/pip": "installs",
     "pip install": "installs",
     "source": "is for a shell",
     "ssh": "needs another machine",
