@@ -79,7 +79,8 @@ def inline_formula(self: Any, node: nodes.math) -> None:
 
 
 def block_formula(self: Any, node: nodes.math_block) -> None:
-    self.body.append(f'<div class="math">{tex2mathml(node.astext(), as_block=True)}</div>')
+    formula = tex2mathml(node.astext(), as_block=True)
+    self.body.append(f'<div class="math" tabindex="0">{formula}</div>')
     raise nodes.SkipNode
 
 
@@ -133,6 +134,13 @@ def safe(text: str) -> str:
     return MARKUP.sub(lambda m: f"`{m[1]}`" if m[1] else "\\" + m[2], text)
 
 
+def accessible(app: Sphinx, page: str, template: str, context: dict[str, Any], tree: Any) -> None:
+    """Give the captions of the sidebar the level that a heading has to have."""
+    role = 'role="heading"'
+    shown = context["furo_navigation_tree"]
+    context["furo_navigation_tree"] = shown.replace(role, f'{role} aria-level="2"')
+
+
 class Diagram(SphinxDirective):
     """A block of Mermaid, which needs a script to be drawn: its text, folded away."""
 
@@ -153,6 +161,7 @@ def setup(app: Sphinx) -> dict[str, bool]:
     app.connect("autodoc-process-docstring", structured)
     app.connect("autodoc-process-signature", readable)
     app.connect("autodoc-skip-member", skipped)
+    app.connect("html-page-context", accessible, priority=900)
     app.add_directive("mermaid", Diagram)
     app.add_html_math_renderer("mathml", (inline_formula, None), (block_formula, None))
     return {"parallel_read_safe": True, "parallel_write_safe": True}

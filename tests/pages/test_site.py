@@ -11,6 +11,7 @@ import pytest
 from docutils.utils.math.latex2mathml import tex2mathml
 from pydantic import BaseModel
 
+import flowborne
 import scene_keys
 from docstrings import entries, meanings, prose
 from flowborne.scenes.load import scene_names
@@ -63,6 +64,24 @@ def test_formulas_are_mathematics_in_the_page(site: Path) -> None:
     text = (site / "method" / "coupled-solve.html").read_text(encoding="utf-8")
     assert text.count("<math") > 10
     assert tex2mathml(r"\hat p").splitlines()[1].strip() in text
+
+
+def test_a_symbol_of_a_chapter_leads_to_its_row(site: Path) -> None:
+    chapter = (site / "method" / "viscosity.html").read_text(encoding="utf-8")
+    places = re.findall(r'<a class="symbol" href="index.html#(symbol-\d+)"', chapter)
+    table = (site / "method" / "index.html").read_text(encoding="utf-8")
+    assert len(places) > 10
+    assert all(f'id="{place}"' in table for place in places)
+
+
+def test_every_public_module_has_a_page_and_simulation_is_first(site: Path) -> None:
+    for name in ("flowborne", *(f"flowborne.{page}" for page in flowborne.PAGES)):
+        text = (site / "api" / f"{name}.html").read_text(encoding="utf-8")
+        found = re.findall(r'class="sig sig-object py" id="([^"]+)"', text)
+        assert found
+        assert all(one.startswith(f"{name}.") for one in found)
+        if name == "flowborne":
+            assert found[0] == "flowborne.Simulation"
 
 
 def tables_below(model: type[BaseModel]) -> set[type[BaseModel]]:
