@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import NamedTuple
 
 from markdown_text import table
@@ -104,6 +105,9 @@ SYMBOLS = (
     Symbol(r"\lambda_E", "Lamé's first constant", "Pa", "flesh"),
 )
 
+TIME = re.compile(r"\^(?:[n*+]|\{n[^}]*\})$")
+"""Superscript that says when in a step."""
+
 PAGE = "method/index"
 """Page of the table."""
 
@@ -128,5 +132,6 @@ def page() -> str:
 
 
 def symbol_of(latex: str) -> Symbol | None:
-    """The symbol that a formula is, and nothing else; None if it is more or unknown."""
-    return next((one for one in SYMBOLS if one.latex == latex.strip()), None)
+    """The symbol that a formula is, at any time of the step; None if it is more or unknown."""
+    letter = TIME.sub("", latex.strip())
+    return next((one for one in SYMBOLS if one.latex == letter), None)

@@ -5,6 +5,7 @@ The pages have the same commands and more, and a test runs those (`test_pages.py
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -24,6 +25,12 @@ OWN = [words[1:] for words in COMMANDS if words[0] == ".venv/bin/flowborne"]
 
 def test_it_fits_on_a_few_screens() -> None:
     assert len(README.read_text(encoding="utf-8").splitlines()) <= 120
+
+
+def test_its_pictures_are_there_and_small() -> None:
+    shown = re.findall(r'<img src="([^"]+)"', README.read_text(encoding="utf-8"))
+    assert len(shown) > 3
+    assert all((README.parent / path).stat().st_size < 600_000 for path in shown)
 
 
 def test_every_line_is_a_command_of_flowborne_or_a_target_of_make() -> None:

@@ -50,6 +50,11 @@ def test_every_letter_of_a_chapter_is_in_the_table(page: Path) -> None:
     assert found - KNOWN == set()
 
 
+def test_a_symbol_is_known_at_any_time_of_a_step() -> None:
+    found = [symbols.symbol_of(latex) for latex in ("u", "u^*", r"u^{n+1/2}", "u^n", "u^2", "2 u")]
+    assert [one and one.latex for one in found] == ["u", "u", "u", "u", None, None]
+
+
 def test_letters_are_read() -> None:
     assert letters_of(
         r"\frac{m_f}{\Delta t} \left( u_f^+ - \bar\eta\, x \right) \text{ in } M^{-1}"
