@@ -7,7 +7,7 @@ from flowborne_validation.creeping import array_drag, scallop_drift
 
 def test_C3_a_scallop_stays_where_it_is() -> None:
     """.65 mm in two cycles with one sweep a step."""
-    (way,) = scallop_drift(45, 1).values()
+    (way,) = scallop_drift(45, 1, 1000.0).values()
     assert abs(way.values) < 0.1
 
 

@@ -89,31 +89,37 @@ def sinking_rod(cells: int, number: float) -> Figures:
 LINK, THICK = 0.1, 0.012
 """m, of the scallop's shells: length and radius."""
 
+OPENED = np.radians([-40.0, -100.0, -40.0])
+"""Angles of its hinge at OPENING, s."""
 
-def scallop_drift(cells: int, steps: int, cycles: int = 1) -> Figures:
+OPENING = 0.0, 0.2, 1.0
+
+
+def scallop_drift(cells: int, steps: int, viscosity: float, cycles: int = 1) -> Figures:
     """C3: how far a scallop gets along its axis in a cycle, which opens fast and closes slowly, in
-    mm; the theorem of Purcell (1977) says 0.
+    mm; without inertia 0, by the theorem of Purcell (1977).
 
     cells  in 0.45 m
     steps  in 1/50 s
     """
     shell = f'<geom type="capsule" fromto="0 0 0 {LINK} 0 0" size="{THICK}"/>'
     other = f'<body><joint name="hinge" type="hinge" axis="0 0 1"/>{shell}</body>'
-    angles = np.radians([-40.0, -100.0, -40.0])
     h = 0.45 / cells
     world = make_world(
         mjcf(f"<body>{PLANAR}{shell}{other}</body>"),
         Grid.slab(cells, round(0.4 / h), h, (-0.2, -0.2)),
         solid_density=DENSITY,
         density=DENSITY,
-        viscosity=1000.0,
-        motions=(TrajectoryKeyframes(np.array([3]), Curve((0.0, 0.2, 1.0), tuple(angles))),),
+        viscosity=viscosity,
+        motions=(TrajectoryKeyframes(np.array([3]), Curve(OPENING, tuple(OPENED))),),
     )
-    world.solid.q[2:4] = -0.5 * angles[0], angles[0]
+    world.solid.q[2:4] = -0.5 * OPENED[0], OPENED[0]
     before, dt = world.solid.q[:2].copy(), 0.02 / steps
     start(world, dt)
     advance(world, dt, 50 * steps)
-    return {f"{steps} steps a frame": Figure(1e3 * (world.solid.q[0] - before[0]))}
+    speed = LINK * abs(OPENED[1] - OPENED[0]) / OPENING[1]
+    name = f"{steps} steps a frame, Re {DENSITY * speed * LINK / viscosity:.1g}"
+    return {name: Figure(1e3 * (world.solid.q[0] - before[0]))}
 
 
 def sphere_in_array(cells: Sequence[int], part: float) -> Figures:
