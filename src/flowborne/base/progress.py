@@ -32,6 +32,7 @@ class RunProgress:
     kernels    number of kernels compiled so far
     warnings   number of warnings about the scene
     objective  after the frame; nan where there is none
+    unit       of the objective, "" where its terms have several
     joints     (column of the history, rad or m) of each controlled joint
     clip       which run of a batch begins; "" in other stages
     """
@@ -43,6 +44,7 @@ class RunProgress:
     kernels: int = 0
     warnings: int = 0
     objective: float = math.nan
+    unit: str = ""
     joints: tuple[tuple[str, float], ...] = ()
     clip: str = ""
 
@@ -113,14 +115,12 @@ class ProgressDisplay:
             return f"run {news.frame}/{news.frames}"
         words = [f"frame {news.frame}/{news.frames}"]
         if not math.isnan(news.objective):
-            words.append(f"objective {news.objective:.4g}")
+            words.append(f"objective {news.objective:.4g} {news.unit}".rstrip())
         words += [_position(column, value) for column, value in news.joints[:3]]
         done = news.frame - self._started_at - 1
-        if done > 0 and self._first is not None:
+        if done > 0 and self._first is not None and self._bar is None:
             pace = (news.seconds - self._first) / done
-            words.append(f"{pace:.3g} s/frame")
-            if self._bar is None:
-                words.append(f"{pace * (news.frames - news.frame):.0f} s left")
+            words.append(f"{pace * (news.frames - news.frame):.0f} s left")
         return "  ".join(words)
 
     def say(self, text: str) -> None:

@@ -28,12 +28,13 @@ from flowborne.runs.states import check_states
 from flowborne.runs.strained import strained
 from flowborne.runs.summary import doubts_of, peak_memory, summarise, versions
 from flowborne.scenes.bodies import driven_dofs
+from flowborne.scenes.control import objective_unit
 from flowborne.scenes.creature import creature_of
 from flowborne.scenes.earlier import earlier_joints
 from flowborne.scenes.notes import notes_of
 from flowborne.scenes.save import scene_to_resume, with_frames, write_scene
 from flowborne.scenes.seen import seen_bodies
-from flowborne.scenes.warn import warnings_of
+from flowborne.scenes.warn import accepted_of, warnings_of
 from flowborne.sim.frame import PARTS, FrameReport, Snapshot
 from flowborne.sim.simulation import BlowUpError, Simulation
 
@@ -170,6 +171,8 @@ class _Run:
         self.frames = simulation.frames
         self.taken = earlier_joints(simulation.scene)  # the run may take the earlier one's place
         self.warnings = warnings_of(simulation.scene, simulation.setup)
+        scene, model = simulation.scene, simulation.setup.solid
+        self.unit = objective_unit(scene.objectives, scene.controlled_joints(), model)
         self.columns = (*simulation.columns.names, *(f"seconds_{p}" for p in ("total", *PARTS)))
         self.recorder = Recorder(folder)
         self.history: History | None = None
@@ -237,7 +240,7 @@ class _Run:
             except OSError as error:
                 return RunOutcome.NOT_WRITTEN, self._not_written(error)
             joints = tuple((c, values[c]) for c in simulation.columns.controlled)
-            self.show("frame", objective=report.objective, joints=joints)
+            self.show("frame", objective=report.objective, unit=self.unit, joints=joints)
         try:
             self._save()
         except OSError as error:
@@ -366,10 +369,11 @@ class _Run:
             "message": message,
             "doubts": self._doubts(),
             **summarise(self.folder.history, strength, every),
+            "objective_unit": self.unit,
             "cells": cells,
             "creature": None if creature is None else asdict(creature),
             "warnings": self.warnings,
-            "notes": list(notes_of(scene, world.setup.solid)),
+            "notes": [*notes_of(scene, world.setup.solid), *accepted_of(scene, world.setup)],
             "bodies_as_seen": [asdict(seen) for seen in seen_bodies(world.setup)],
             "state_bytes": state_bytes(world),
             "bytes_per_cell": None if cells is None else state_bytes(world) / cells,
