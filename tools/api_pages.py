@@ -17,6 +17,14 @@ PAGE = """## `{name}`
 ```
 """
 
+ALONE = {
+    "scenes": ".. autofunction:: flowborne.scenes",
+    "view": ".. autofunction:: flowborne.view",
+    "OpenRun": ".. autoclass:: flowborne.OpenRun\n   :members:\n   :inherited-members: object",
+}
+"""Directives of what is documented by itself: packages that are called, and a class with members
+of the one above it."""
+
 
 def page() -> str:
     """A section for each public module; what several have is told in the first."""
@@ -27,7 +35,9 @@ def page() -> str:
         here = [n for n, one in things.items() if documented(one) and id(one) not in told]
         elsewhere = [(n, told[id(one)]) for n, one in things.items() if id(one) in told]
         told.update({id(things[name]): module.__name__ for name in here})
-        text.append(PAGE.format(name=module.__name__, members=", ".join(here)))
+        members = ", ".join(name for name in here if name not in ALONE)
+        text.append(PAGE.format(name=module.__name__, members=members))
+        text += [f"```{{eval-rst}}\n{ALONE[name]}\n```\n" for name in here if name in ALONE]
         if elsewhere:
             said = ", ".join(f"`{name}` (see `{where}`)" for name, where in elsewhere)
             text.append(f"Also here: {said}.\n")

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from time import monotonic
 from typing import Literal
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, SpinnerColumn, TextColumn, TimeRemainingColumn
+from rich.progress import Progress as Bar
 
 Stage = Literal["clip", "start", "compiling", "frame", "film", "member"]
 
@@ -49,12 +52,16 @@ class RunProgress:
     clip: str = ""
 
 
+Progress = Callable[[RunProgress], None]
+"""What is called with each piece of news."""
+
+
 class ProgressDisplay:
     """Shows `RunProgress` on standard error; call it with each piece of news, inside a `with`."""
 
     def __init__(self) -> None:
         self._stream = sys.stderr
-        self._bar: Progress | None = None
+        self._bar: Bar | None = None
         self._started_at = 0
         self._first: float | None = None
         self._line_due = 0.0
@@ -62,7 +69,7 @@ class ProgressDisplay:
 
     def __enter__(self) -> ProgressDisplay:
         if self._stream.isatty():
-            self._bar = Progress(
+            self._bar = Bar(
                 SpinnerColumn(),
                 TextColumn("{task.description}", markup=False),
                 BarColumn(bar_width=24),
@@ -129,6 +136,16 @@ class ProgressDisplay:
             self._bar.console.print(text, markup=False, highlight=False)
         else:
             print(text, file=self._stream, flush=True)
+
+
+@contextmanager
+def displayed(progress: Progress | bool | None) -> Iterator[Progress | None]:
+    """Context with what is to be called with each piece of news: a new display for True."""
+    if progress is True:
+        with ProgressDisplay() as display:
+            yield display
+    else:
+        yield progress or None
 
 
 def _position(column: str, value: float) -> str:

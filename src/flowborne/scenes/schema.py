@@ -183,6 +183,15 @@ class Scene(Table):
             return {"fluid": {}, "boundaries": {}, **data}
         return data
 
+    def __repr__(self) -> str:
+        grid = self.domain.grid() if self.domain is not None and self.has_fluid else "no fluid"
+        return (
+            f"Scene '{self.name}': {self.dimensions}D, {grid}, {self.time.frames} frames of "
+            f"{self.frame_time:.4g} s"
+        )
+
+    __str__ = __repr__
+
     @property
     def has_bodies(self) -> bool:
         """Whether there is anything to move."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import signal
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, dataclass
 from enum import Enum
@@ -18,7 +18,7 @@ import numpy as np
 
 from flowborne.base.errors import PartError, SceneError, WorkerError
 from flowborne.base.extras import missing_to_draw
-from flowborne.base.progress import RunProgress, Stage
+from flowborne.base.progress import Progress, RunProgress, Stage, displayed
 from flowborne.kernels.jit import compilation_watched
 from flowborne.runs.checkpoint import load_checkpoint, save_checkpoint, state_bytes
 from flowborne.runs.history import History
@@ -37,6 +37,8 @@ from flowborne.scenes.seen import seen_bodies
 from flowborne.scenes.warn import accepted_of, warnings_of
 from flowborne.sim.frame import PARTS, FrameReport, Snapshot
 from flowborne.sim.simulation import BlowUpError, Simulation
+from flowborne.view.embedded import run_html
+from flowborne.view.open_run import OpenRun
 
 if TYPE_CHECKING:
     from flowborne.scenes.schema import Scene
@@ -78,6 +80,16 @@ class RunResult:
     frames: int
     summary: dict[str, Any]
 
+    def __repr__(self) -> str:
+        return f"RunResult in {self.folder}: {self.outcome.value}, {self.frames} frames"
+
+    def _repr_html_(self) -> str:
+        return run_html(repr(self), self.folder)
+
+    def open(self) -> OpenRun:
+        """The run, to read, plot and view it."""
+        return OpenRun(self.folder)
+
 
 class RunInterrupted(KeyboardInterrupt):
     """The run was interrupted; everything up to its last whole frame is saved.
@@ -99,7 +111,7 @@ def run(
     resume: bool = False,
     replace: bool = False,
     film: bool = True,
-    progress: Callable[[RunProgress], None] | None = None,
+    progress: Progress | bool | None = None,
 ) -> RunResult:
     """Run a scene and write the files listed in `flowborne.runs.run_folder`.
 
@@ -110,7 +122,7 @@ def run(
     resume    continue the run in `out` from its checkpoint
     replace   replace an earlier run in `out`
     film      draw preview.png and preview.mp4 at the end
-    progress  called with the progress of the run
+    progress  called with the progress of the run; True shows it as the command line does
     returns   the result, also of a run that blew up or filled the disc: see its outcome
     raises    RunFolderError if `out` or the arguments are wrong or another run is being written
               there, SceneError if the scene is wrong or does not fit into memory; nothing is then
@@ -134,11 +146,12 @@ def run(
         folder.check_new(replace=replace)
     wanted = with_frames(wanted, frames)
     with folder.locked(), _Signals() as signals, ExitStack() as open_until_the_end:
+        show = open_until_the_end.enter_context(displayed(progress))
         try:
             with signals.interruptible():
                 files = scene_files(wanted)
                 simulation = open_until_the_end.enter_context(Simulation(wanted, workers=workers))
-                job = _Run(simulation, folder, files, signals, progress)
+                job = _Run(simulation, folder, files, signals, show)
                 if wanted.has_fluid:
                     open_until_the_end.enter_context(
                         compilation_watched(lambda kernels: job.show("compiling", kernels=kernels))
@@ -163,7 +176,7 @@ class _Run:
         folder: RunFolder,
         files: dict[str, bytes],
         signals: _Signals,
-        progress: Callable[[RunProgress], None] | None,
+        progress: Progress | None,
     ) -> None:
         self.simulation = simulation
         self.folder = folder

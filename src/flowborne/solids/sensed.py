@@ -13,6 +13,7 @@ from functools import cached_property, partial
 
 import numpy as np
 
+from flowborne.base.one_line import one_line
 from flowborne.kernels.arrays import Array
 from flowborne.solids.dynamics import Kinematics, kinematics
 from flowborne.solids.model import SolidModel
@@ -36,6 +37,8 @@ class BodyState:
     added_mass        gives (6,) the part of force and torque with which the fluid resists
                       acceleration, solved for when it is first asked for
     """
+
+    __repr__ = one_line
 
     position: Array
     rotation: Array
@@ -69,6 +72,8 @@ class JointState:
     drive     (m,) torque (N m) or force (N) of its drive, per m in a slab
     """
 
+    __repr__ = one_line
+
     position: Array
     velocity: Array
     drive: Array
@@ -81,6 +86,8 @@ class ActuatorState:
     force       (k,) N or N m, positive where it lengthens; one number, three of a ball joint
     activation  (m,) of a muscle or filter; empty without
     """
+
+    __repr__ = one_line
 
     force: Array
     activation: Array

@@ -9,6 +9,7 @@ from pathlib import Path
 from urllib.parse import quote
 
 from flowborne.base.atomic import write_text
+from flowborne.base.one_line import one_line
 from flowborne.runs.run_folder import RunFolder, cannot_write
 
 PAGE = "index.html"
@@ -55,6 +56,8 @@ class ClipRun:
     after     the same in the run, where the controller moves these joints
     """
 
+    __repr__ = one_line
+
     clip: Path
     folder: Path
     captured: Path | None = None
@@ -84,6 +87,8 @@ class Batch:
     skipped  names of what is in the folder and is no clip
     clips    those done, in the order of their names
     """
+
+    __repr__ = one_line
 
     scene: str
     joints: tuple[str, ...]

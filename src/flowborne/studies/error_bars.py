@@ -13,11 +13,12 @@ import numpy as np
 from scipy.optimize import brentq
 
 from flowborne.base.errors import SceneError
+from flowborne.base.one_line import one_line
 from flowborne.kernels.arrays import Array
-from flowborne.runs.open_run import OpenRun
 from flowborne.scenes.load import load_scene
 from flowborne.scenes.schema import Scene
 from flowborne.sim.running import RunOutcome, run
+from flowborne.view.open_run import OpenRun
 
 FORMAL_ORDER = 2.0
 """Order of the scheme in grid and step for smooth flows."""
@@ -55,6 +56,8 @@ class Refinement:
     uncertainty   half width of the bar around the finest value, never negative
     spread        largest value minus the smallest, of all
     """
+
+    __repr__ = one_line
 
     resolutions: tuple[float, ...]
     values: tuple[float, ...]
@@ -135,6 +138,8 @@ class ErrorBar:
                  `value` is the half width of the place: if a number varies over a cell, the places
                  half a cell apart are on either side of its mean
     """
+
+    __repr__ = one_line
 
     value: float
     uncertainty: float
