@@ -55,7 +55,7 @@ def test_scenes_are_listed_in_python_as_on_the_command_line() -> None:
     assert {one.group for one in listed} == set(GROUPS)
     eel = next(one for one in listed if one.name == "eel")
     assert (eel.dimensions, eel.cells, eel.seconds) == (2, 122 * 122, 4.0)
-    assert repr(listed).startswith("To begin with: ")
+    assert repr(listed).startswith("To begin with, ")
 
 
 def test_names_at_a_prompt_are_the_public_ones() -> None:

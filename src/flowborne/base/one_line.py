@@ -5,12 +5,16 @@ from __future__ import annotations
 from collections.abc import Sized
 from dataclasses import fields
 from enum import Enum
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 LETTERS = 120
 """Most of a line; fields that do not fit are left out."""
+
+PLAIN = str | float | int | Enum | Path
+"""Values that come first."""
 
 SHOWN = 3
 """Most numbers of an array that are shown; of a larger one its shape is."""
@@ -21,7 +25,7 @@ def one_line(record: Any) -> str:
     fields that are None or empty."""
     values = {field.name: getattr(record, field.name) for field in fields(record) if field.repr}
     given = {name: value for name, value in values.items() if _has_something(value)}
-    plain = sorted(given, key=lambda name: not isinstance(given[name], str | float | int | Enum))
+    plain = sorted(given, key=lambda name: not isinstance(given[name], PLAIN))
     said = f"{type(record).__name__}("
     for name in plain:
         more = f"{name}={_short(given[name])}, "
@@ -38,8 +42,8 @@ def _has_something(value: Any) -> bool:
 def _short(value: Any) -> str:
     if isinstance(value, Enum):
         return value.name
-    if isinstance(value, str | bool | int):
-        return repr(value)
+    if isinstance(value, str | int | Path):
+        return repr(str(value)) if isinstance(value, Path) else repr(value)
     if isinstance(value, float):
         return f"{value:.4g}"
     if isinstance(value, np.ndarray) and (value.ndim != 1 or value.size > SHOWN):

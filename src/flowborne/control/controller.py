@@ -53,8 +53,6 @@ class Decision:
     seconds       wall-clock time of the decision
     """
 
-    __repr__ = one_line
-
     decided: bool
     objective: float
     gradient: Array

@@ -13,7 +13,7 @@ MAX_GAS_DENSITY = 10.0
 """kg/m^3"""
 
 FIRST = ("ns-block-drag-max", "human-wind-back", "eel")
-"""Scenes to begin with: none takes more than a few minutes."""
+"""Scenes to begin with: each takes a minute and a half at most on two cores, with its film."""
 
 
 def has_inflow(scene: Scene) -> bool:
@@ -89,7 +89,7 @@ class SceneList(tuple[ListedScene, ...]):
 
     def __str__(self) -> str:
         wide = max(len(one.name) for one in self)
-        lines = [f"To begin with: {', '.join(FIRST)}", ""]
+        lines = [f"To begin with, a minute or two each: {', '.join(FIRST)}", ""]
         lines += [f"  {'':<{wide}}          cells  seconds"]
         for title in GROUPS:
             lines += [title]

@@ -72,8 +72,6 @@ class JointState:
     drive     (m,) torque (N m) or force (N) of its drive, per m in a slab
     """
 
-    __repr__ = one_line
-
     position: Array
     velocity: Array
     drive: Array
@@ -86,8 +84,6 @@ class ActuatorState:
     force       (k,) N or N m, positive where it lengthens; one number, three of a ball joint
     activation  (m,) of a muscle or filter; empty without
     """
-
-    __repr__ = one_line
 
     force: Array
     activation: Array

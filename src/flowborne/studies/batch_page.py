@@ -56,8 +56,6 @@ class ClipRun:
     after     the same in the run, where the controller moves these joints
     """
 
-    __repr__ = one_line
-
     clip: Path
     folder: Path
     captured: Path | None = None

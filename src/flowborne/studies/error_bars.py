@@ -13,7 +13,6 @@ import numpy as np
 from scipy.optimize import brentq
 
 from flowborne.base.errors import SceneError
-from flowborne.base.one_line import one_line
 from flowborne.kernels.arrays import Array
 from flowborne.scenes.load import load_scene
 from flowborne.scenes.schema import Scene
@@ -56,8 +55,6 @@ class Refinement:
     uncertainty   half width of the bar around the finest value, never negative
     spread        largest value minus the smallest, of all
     """
-
-    __repr__ = one_line
 
     resolutions: tuple[float, ...]
     values: tuple[float, ...]
@@ -138,8 +135,6 @@ class ErrorBar:
                  `value` is the half width of the place: if a number varies over a cell, the places
                  half a cell apart are on either side of its mean
     """
-
-    __repr__ = one_line
 
     value: float
     uncertainty: float

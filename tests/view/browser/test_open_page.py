@@ -11,6 +11,7 @@ from urllib.request import urlopen
 import pytest
 
 import flowborne as fb
+from flowborne.cli.main import main
 
 pytest.importorskip("viser", reason="the viewer needs viser: pip install 'flowborne[view]'")
 
@@ -45,3 +46,16 @@ def test_a_page_is_served_until_it_is_closed(write_run: Write) -> None:
 def test_a_folder_without_a_run_is_refused(tmp_path: Path) -> None:
     with pytest.raises(fb.RunFolderError, match="there is no folder"):
         fb.view(tmp_path / "nothing", port=free_port())
+
+
+def test_the_command_says_that_the_page_starts_before_it_is_there(
+    write_run: Write, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder, port = write_run(frames=6), free_port()
+    monkeypatch.setattr("flowborne.view.browser.viewer.serve", lambda viewer: viewer.server.stop())
+    with pytest.raises(SystemExit) as left:
+        main(["view", str(folder), "--port", str(port)])
+    lines = capsys.readouterr().out.splitlines()
+    assert left.value.code == 0
+    assert lines[0] == "starting the page …"
+    assert f"viewing {folder} at http://127.0.0.1:{port}; Ctrl-C ends it" in lines
