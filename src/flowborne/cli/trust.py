@@ -10,6 +10,7 @@ from flowborne.cli.app import (
     FAILED,
     TRUST,
     WARNED,
+    SceneArgument,
     SceneOption,
     command,
     compilation_shown,
@@ -19,7 +20,7 @@ from flowborne.cli.app import (
 
 @command(TRUST, "flowborne check fish.toml --set domain.resolution=64")
 def check(
-    scene: Annotated[str, typer.Argument(metavar="SCENE.toml", help="Scene file to check.")],
+    scene: SceneArgument,
     settings: SceneOption = None,
     trust: Annotated[
         bool,
