@@ -109,7 +109,7 @@ def test_the_wheel_works_in_a_fresh_environment(
     version = archives[1].name.split("-")[1]
     assert flowborne(fresh, tmp_path, "--version") == f"{version}\n"
     assert "eel-room" in flowborne(fresh, tmp_path, "scenes")
-    assert "\nnothing wrong\n" in flowborne(fresh, tmp_path, "check", "block-effort-wind")
+    assert "\nno warnings\n" in flowborne(fresh, tmp_path, "check", "block-effort-wind")
     assert f"flowborne {version}" in flowborne(fresh, tmp_path, "doctor")
     assert not list(tmp_path.iterdir())
 

@@ -14,7 +14,7 @@ MOST = 8
 """Parameters of a function, `self` and `cls` aside; what belongs together comes as one."""
 
 LONGER = {
-    "cli/main.py run": 9,
+    "cli/make.py run": 9,
     "kernels/dye.py bend_row": 10,
     "kernels/dye.py cross_row": 10,
     "kernels/flux.py side_row": 12,

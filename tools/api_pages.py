@@ -43,11 +43,12 @@ def page(name: str) -> str:
 
 def directive(module: str, name: str, thing: object) -> str:
     """The directive that documents a thing."""
-    is_class = inspect.isclass(thing)
-    kind = "class" if is_class else "function"
-    return DIRECTIVE.format(
-        kind=kind, module=module, name=name, members="   :members:\n" if is_class else ""
-    )
+    if not inspect.isclass(thing):
+        return DIRECTIVE.format(kind="function", module=module, name=name, members="")
+    members = "   :members:\n"
+    if name == "OpenRun":  # what it has comes from a class that is not public
+        members += "   :inherited-members: object\n"
+    return DIRECTIVE.format(kind="class", module=module, name=name, members=members)
 
 
 def home(thing: object) -> str:

@@ -105,7 +105,7 @@ def of_bvh(path: Path, creature: Creature) -> Away:
     turn, degrees = skeleton.carried[0], 0.0
     names = ["_".join(name.split()) for name in skeleton.names]
     bones, first = list(range(len(names))), np.eye(3)
-    if "clip" in creature.run.scene:
+    if "clip" in creature.run.tables:
         start = reader.joints(0)
         bones = [n for n in bones if names[n] in start]
         first = np.array([start[names[n]][:3, :3].T for n in bones])

@@ -1,8 +1,8 @@
 """Makes docs/gallery.md and its pictures from the built-in scenes: `make gallery`.
 
-The library is the only list. A scene belongs to the first group that holds it, and the group
-defines the run that gives the picture. `make gallery` makes the pictures that are missing and
-writes the page; `make gallery NAMES="eel swimmer"` makes these pictures again.
+The library is the only list, in the groups of `flowborne scenes`. `make gallery` makes the
+pictures that are missing and writes the page; `make gallery NAMES="eel swimmer"` makes these
+pictures again.
 """
 
 from __future__ import annotations
@@ -13,13 +13,26 @@ from collections.abc import Callable, Mapping
 from contextlib import closing
 from dataclasses import dataclass, field
 from io import BytesIO
-from itertools import groupby
 from math import radians, tan
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from PIL import Image
 
+from flowborne.scenes.listing import (
+    FLESHY,
+    FLYERS,
+    GROUPS,
+    IN_STREAM,
+    IN_WIND,
+    OPEN,
+    ROBOTS,
+    VEHICLES,
+    WALKERS,
+    group_of,
+    has_gas,
+    has_inflow,
+)
 from flowborne.scenes.load import load_scene, read_scene, scene_names
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.schema_film import CameraTable
@@ -42,19 +55,16 @@ MAX_BYTES = 30_000
 QUALITIES = (88, 80, 70, 60, 50, 40)
 """Of the WebP: the first that gives at most MAX_BYTES, or the last."""
 
-MAX_GAS_DENSITY = 10.0
-"""kg/m^3"""
-
 MANY_JOINTS = 10
 """Controlled joints from which a creature in three dimensions runs on a coarser grid."""
 
 
 @dataclass(frozen=True)
-class Group:
-    """Scenes that are shown together, and the run of each that gives its picture.
+class GroupRun:
+    """Scenes of a group of the library, and the run of each that gives its picture.
 
-    title     heading; neighbours that have the same one share it
-    holds     whether a scene is one of them
+    title     heading of the group
+    holds     whether a scene of the group is one of them
     frame     number of the frame that is shown; the last one of a shorter scene
     settings  changes of the scene, as those of `--set`
     """
@@ -70,45 +80,25 @@ class Group:
         return " ".join(f"--set {shlex.quote(f'{k}={v}')}" for k, v in self.settings.items())
 
 
-def has_inflow(scene: Scene) -> bool:
-    """Whether a stream enters the domain."""
-    sides = scene.boundaries.model_dump().values() if scene.boundaries else ()
-    return any(isinstance(side, dict) and side.get("kind") == "inflow" for side in sides)
-
-
-def has_gas(scene: Scene) -> bool:
-    """Whether the fluid is a gas."""
-    return scene.fluid is not None and scene.fluid.density <= MAX_GAS_DENSITY
-
-
-def follows(scene: Scene) -> bool:
-    """Whether the domain moves with bodies."""
-    return scene.domain is not None and scene.domain.follows
-
-
-OPEN, FLYERS, ROBOTS = "Open water and open air", "Flyers", "Swimming robots"
-
-GROUPS = (
-    Group(OPEN, lambda scene: follows(scene) and scene.dimensions == 2, 300),
-    Group(OPEN, lambda scene: follows(scene) and has_gas(scene), 320, {"domain.resolution": "36"}),
-    Group(
+RUNS = (
+    GroupRun(OPEN, lambda scene: scene.dimensions == 2, 300),
+    GroupRun(OPEN, has_gas, 320, {"domain.resolution": "36"}),
+    GroupRun(
         OPEN,
-        lambda scene: follows(scene) and len(scene.controlled_joints()) >= MANY_JOINTS,
+        lambda scene: len(scene.controlled_joints()) >= MANY_JOINTS,
         48,
         {"domain.resolution": "36"},
     ),
-    Group(
-        OPEN, lambda scene: follows(scene) and bool(scene.flesh), 40, {"domain.resolution": "30"}
-    ),
-    Group(OPEN, follows, 140),
-    Group("Walkers", lambda scene: scene.human is not None, 60),
-    Group("Blocks in a prescribed wind", lambda scene: scene.domain is None, 80),
-    Group("Blocks in a stream", has_inflow, 100, {"domain.resolution": "64"}),
-    Group(FLYERS, lambda scene: has_gas(scene) and not scene.flesh, 320),
-    Group(FLYERS, has_gas, 20, {"time.frames_per_second": "15.0"}),
-    Group(
-        "Swimmers of flesh and bone",
-        lambda scene: bool(scene.flesh),
+    GroupRun(OPEN, lambda scene: bool(scene.flesh), 40, {"domain.resolution": "30"}),
+    GroupRun(OPEN, lambda scene: True, 140),
+    GroupRun(WALKERS, lambda scene: True, 60),
+    GroupRun(IN_WIND, lambda scene: True, 80),
+    GroupRun(IN_STREAM, lambda scene: True, 100, {"domain.resolution": "64"}),
+    GroupRun(FLYERS, lambda scene: not scene.flesh, 320),
+    GroupRun(FLYERS, lambda scene: True, 20, {"time.frames_per_second": "15.0"}),
+    GroupRun(
+        FLESHY,
+        lambda scene: True,
         40,
         {
             "domain.lower": "[-6.0, -6.0, -10.0]",
@@ -116,24 +106,25 @@ GROUPS = (
             "domain.resolution": "32",
         },
     ),
-    Group("Vehicles", lambda scene: bool(scene.thruster), 180),
-    Group(ROBOTS, lambda scene: scene.dimensions == 2, 180),
-    Group(ROBOTS, lambda scene: True, 180, {"domain.resolution": "61"}),
+    GroupRun(VEHICLES, lambda scene: True, 180),
+    GroupRun(ROBOTS, lambda scene: scene.dimensions == 2, 180),
+    GroupRun(ROBOTS, lambda scene: True, 180, {"domain.resolution": "61"}),
 )
-"""In the order of the page."""
+"""Of each group: the first that holds a scene."""
 
 EARLIER = {"swimmer-held": 12, "swimmer-stroke": 6}
 """Frames that are shown of scenes that take too long to get to their group's."""
 
 
-def group_of(scene: Scene) -> Group:
-    """The first group that holds a scene."""
-    return next(group for group in GROUPS if group.holds(scene))
+def run_of(scene: Scene) -> GroupRun:
+    """The run that gives a scene's picture."""
+    title = group_of(scene)
+    return next(one for one in RUNS if one.title == title and one.holds(scene))
 
 
 def frame_of(scene: Scene) -> int:
     """Number of the frame that is shown of a scene."""
-    return min(EARLIER.get(scene.name, group_of(scene).frame), scene.time.frames)
+    return min(EARLIER.get(scene.name, run_of(scene).frame), scene.time.frames)
 
 
 def picture_of(name: str) -> Path:
@@ -155,9 +146,8 @@ def section() -> str:
     """All groups with their scenes, each in the order of the library."""
     scenes = [load_scene(name) for name in scene_names()]
     text = []
-    for title, same in groupby(GROUPS, key=lambda group: group.title):
-        groups = list(same)
-        shown = [scene for scene in scenes if group_of(scene) in groups]
+    for title in GROUPS:
+        shown = [scene for scene in scenes if group_of(scene) == title]
         text += [f"## {title}\n", *map(item, shown), *notes(shown)]
     return "\n".join(text) + "\n"
 
@@ -166,7 +156,7 @@ def notes(scenes: list[Scene]) -> list[str]:
     """How the runs for the pictures differ from the scenes, a sentence for each set of options."""
     names: dict[str, list[str]] = {}
     for scene in scenes:
-        names.setdefault(group_of(scene).options, []).append(f"`{scene.name}`")
+        names.setdefault(run_of(scene).options, []).append(f"`{scene.name}`")
     return [
         f"To save time, {listed(some)} ran with `{options}` for this page.\n"
         for options, some in names.items()
@@ -197,7 +187,7 @@ def simulate(name: str, folder: Path) -> None:
 
     raises  SystemExit when the run does not get there
     """
-    scene = load_scene(name, group_of(load_scene(name)).settings)
+    scene = load_scene(name, run_of(load_scene(name)).settings)
     result = run(scene, folder, frames=frame_of(scene), film=False)
     if result.outcome is not RunOutcome.DONE:
         sys.exit(f"{name}: {result.message}")

@@ -33,10 +33,11 @@ if TYPE_CHECKING:
     from flowborne.fluid.state import FluidState
     from flowborne.formats.exporting import export
     from flowborne.kernels.arrays import Array, Faces
-    from flowborne.runs.open_run import OpenRun, open_run
     from flowborne.runs.run_folder import RunFolderError
+    from flowborne.scenes.listing import scenes
     from flowborne.scenes.load import load_scene
     from flowborne.scenes.schema import Scene
+    from flowborne.sim.checked import Checked, check
     from flowborne.sim.frame import FrameReport, Snapshot
     from flowborne.sim.running import RunInterrupted, RunResult, run
     from flowborne.sim.simulation import BlowUpError, Simulation
@@ -49,6 +50,8 @@ if TYPE_CHECKING:
     from flowborne.studies.error_bars import ErrorBar, Refinement, error_bar
     from flowborne.studies.result import StudyResult
     from flowborne.studies.running import study
+    from flowborne.view.browser.open_page import view
+    from flowborne.view.open_run import OpenRun, open_run
     from flowborne.worlds import advance, make_world
 
 __all__ = [
@@ -57,6 +60,7 @@ __all__ = [
     "Batch",
     "BlowUpError",
     "BodyState",
+    "Checked",
     "ClipRun",
     "Control",
     "Controller",
@@ -99,6 +103,7 @@ __all__ = [
     "__version__",
     "advance",
     "bodies",
+    "check",
     "error_bar",
     "export",
     "import_character",
@@ -110,13 +115,20 @@ __all__ = [
     "pictures",
     "run",
     "run_clips",
+    "scenes",
     "step",
     "study",
+    "view",
     "worlds",
 ]
 
+__dir__ = __all__.copy
+
 PAGES = ("parts", "bodies", "play.gym", "machine", "pictures", "worlds")
 """Public modules of the package, besides itself."""
+
+CALLED = ("scenes", "view")
+"""Packages that are called as functions."""
 
 _PLACES = {
     "ActuatorState": "flowborne.solids.sensed",
@@ -124,6 +136,7 @@ _PLACES = {
     "Batch": "flowborne.studies.batch_page",
     "BlowUpError": "flowborne.sim.simulation",
     "BodyState": "flowborne.solids.sensed",
+    "Checked": "flowborne.sim.checked",
     "Control": "flowborne.control.commands",
     "ClipRun": "flowborne.studies.batch_page",
     "Controller": "flowborne.control.controller",
@@ -140,7 +153,7 @@ _PLACES = {
     "Imported": "flowborne.characters.folder",
     "JointState": "flowborne.solids.sensed",
     "Measurement": "flowborne.control.measurement",
-    "OpenRun": "flowborne.runs.open_run",
+    "OpenRun": "flowborne.view.open_run",
     "Outcome": "flowborne.coupling.report",
     "PartError": "flowborne.base.errors",
     "Position": "flowborne.control.commands",
@@ -164,12 +177,13 @@ _PLACES = {
     "Velocity": "flowborne.control.commands",
     "World": "flowborne.coupling.world",
     "advance": "flowborne.worlds",
+    "check": "flowborne.sim.checked",
     "error_bar": "flowborne.studies.error_bars",
     "export": "flowborne.formats.exporting",
     "import_character": "flowborne.characters.folder",
     "load_scene": "flowborne.scenes.load",
     "make_world": "flowborne.worlds",
-    "open_run": "flowborne.runs.open_run",
+    "open_run": "flowborne.view.open_run",
     "run": "flowborne.sim.running",
     "run_clips": "flowborne.studies.batches",
     "step": "flowborne.coupling.step",
@@ -181,12 +195,8 @@ def __getattr__(name: str) -> Any:
     """Import what is asked for when it is asked for, so that `import flowborne` is light."""
     from importlib import import_module
 
-    if name in PAGES:
+    if name in PAGES or name in CALLED:
         return import_module(f"flowborne.{name}")
     if name not in _PLACES:
         raise AttributeError(f"module 'flowborne' has no attribute {name!r}")
     return getattr(import_module(_PLACES[name]), name)
-
-
-def __dir__() -> list[str]:
-    return sorted(set(globals()) | set(__all__))

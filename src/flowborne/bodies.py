@@ -81,3 +81,5 @@ __all__ = [
     "static_forces",
     "symmetric_factor",
 ]
+
+__dir__ = __all__.copy

@@ -41,6 +41,8 @@ __all__ = [
     "state_bytes",
 ]
 
+__dir__ = __all__.copy
+
 STREAM = (100, 100, 1000)
 """Shape of arrays that exceed every cache."""
 

@@ -64,9 +64,9 @@ from flowborne.control.rules import (
 )
 from flowborne.control.station import keep_station
 from flowborne.runs.exporters import EXPORTERS, Exporter, Written, endings
-from flowborne.runs.open_run import OpenRun
 from flowborne.runs.states import StateArray
 from flowborne.shapes.own import SHAPES, OwnGeometry, PlacedShape
+from flowborne.view.open_run import OpenRun
 
 __all__ = [
     "Estimate",
@@ -115,6 +115,8 @@ __all__ = [
     "shape",
     "write_atomically",
 ]
+
+__dir__ = __all__.copy
 
 objective = OBJECTIVES.register
 rule = RULES.register

@@ -7,3 +7,5 @@ from flowborne.view.plots import ChainCost, plot_chain_cost, plot_courses, plot_
 from flowborne.view.run import Run
 
 __all__ = ["ChainCost", "Picture", "Run", "plot_chain_cost", "plot_courses", "plot_forces"]
+
+__dir__ = __all__.copy

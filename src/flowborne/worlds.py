@@ -76,6 +76,8 @@ __all__ = [
     "velocity_at",
 ]
 
+__dir__ = __all__.copy
+
 Field = Callable[[Array, Array, Array], tuple[Array, Array, Array]]
 """velocity(x, y, z) -> (u, v, w), broadcasting arrays in m to m/s."""
 

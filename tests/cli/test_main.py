@@ -3,6 +3,7 @@ import re
 import subprocess
 import sys
 from dataclasses import asdict, dataclass, field
+from pathlib import Path
 from time import perf_counter
 from types import ModuleType
 
@@ -10,6 +11,7 @@ import pytest
 
 from flowborne.base.progress import ProgressDisplay, RunProgress
 from flowborne.cli import main as cli
+from flowborne.cli.app import WARNED
 from flowborne.motion.bvh import write_clip
 from flowborne.motion.human.gait import gait_clip
 from flowborne.motion.human.skeleton import standard_skeleton
@@ -38,14 +40,19 @@ def test_a_run_tells_what_it_found(command, small_scene, tmp_path):
     assert (tmp_path / "runs" / "small" / "history.csv").exists()
     assert "5 frames are in runs/small" in out
     assert "angle_hinge_rad: 0." in out
-    assert "s per frame" in out
-    assert "frame 5/5  objective" in err
+    assert out.count("s per frame") == 1
+    assert re.search(r"objective: [\d.]+ N \(mean of the last decisions\)\n", out)
+    assert out.endswith("  look at it: flowborne view runs/small\n")
+    assert "film" not in out
+    assert "s/frame" not in err
+    assert re.search(r"frame 5/5  objective [\d.]+ N  hinge", err)
     assert "hinge 47.5°" in err
 
 
 def test_a_film_tells_how_far_it_is(command, small_scene):
     options = ("--frames", 2, "--workers", 1, "--out", "run")
-    _, _, err = command("run", small_scene, *options)
+    _, out, err = command("run", small_scene, *options)
+    assert out.endswith("  film: run/preview.mp4\n  look at it: flowborne view run\n")
     assert "drawing the film …  frame 3/3" in err
     code, out, err = command("film", "run", "--set", "size=[160, 96]", "--out", "films/shot.mp4")
     assert code == 0
@@ -89,7 +96,9 @@ def test_settings_change_the_scene_and_are_written_out(command, small_scene, tmp
         (["film", "taken"], "taken is not the folder of a run"),
         (["figures", "--out", "taken.txt"], "taken.txt cannot be written (File exists)"),
         (["figures", "--out", "taken.txt/new"], "taken.txt/new cannot be written"),
-        (["fly"], "No such command 'fly'"),
+        (["fly"], "there is no command 'fly'. The commands are: "),
+        (["rn"], "there is no command 'rn'; did you mean 'run'?"),
+        (["valdate"], "there is no command 'valdate'; did you mean 'validate'?"),
         (["figures", "3"], "NAME 3: there is no such figure; there are 2, 7, 9b, 10, 11"),
         (["export", "taken", "--out", "walk.bvh"], "taken is not the folder of a run"),
     ],
@@ -179,7 +188,8 @@ def test_a_disc_without_room_is_found_before_the_run(command, small_scene, monke
 SOUND = """creature: 20 kg/m, 0.673 x 0.966 m
 geoms that displace fluid: all 1
 moving bodies without one: none
-nothing wrong
+fluid: none
+no warnings
 """
 
 
@@ -253,10 +263,10 @@ def test_check_counts_its_warnings_and_strictly_ends_with_3(command, small_scene
     slow = ("check", small_scene, *narrow, "--set", "control.0.strength=0.5")
     code, out, err = command(*slow)
     assert (code, err) == (0, "")
-    warning = "1 warning\n  warning: [[control]] 1: a strength of 0.5 degrees/s takes"
-    assert out.startswith(SOUND.replace("nothing wrong\n", warning))
-    assert command(*slow, "--strict") == (cli.WARNED, out, "")
-    assert cli.WARNED == 3
+    warning = "1 warning, 1 note\n  warning: [[control]] 1: a strength of 0.5 degrees/s takes"
+    assert out.startswith(SOUND.replace("no warnings\n", warning))
+    assert command(*slow, "--strict") == (WARNED, out, "")
+    assert WARNED == 3
     assert command("check", small_scene, *narrow, "--strict") == (0, SOUND, "")
 
 
@@ -275,10 +285,18 @@ def test_a_run_says_how_many_warnings_there_are_and_keeps_them(command, small_sc
 def test_scenes_are_listed_with_their_figures(command):
     code, out, _ = command("scenes")
     assert code == 0
-    rows = out.splitlines()
-    assert rows[0].startswith("block-effort-wind")
-    assert "Fig. 4" in rows[0]
-    assert [row.split()[0] for row in rows] == list(scene_names())
+    rows = [line.split() for line in out.splitlines() if line.startswith("  ")][1:]
+    assert sorted(row[0] for row in rows) == sorted(scene_names())
+    of = {name: tuple(row) for name, *row in rows}
+    assert of["eel"][:3] == ("2D", "14884", "4")
+    assert of["eel-room"][:3] == ("3D", "595360", "4")
+    assert of["block-effort-wind"][:3] == ("2D", "none", "3.33")
+    assert of["block-effort-wind"][-3:] == ("(Fig.", "4", "a)")
+    first = out.splitlines()[0].removeprefix("To begin with, a minute or two each: ").split(", ")
+    assert len(set(first) & set(scene_names())) == 3
+    gallery = (Path(__file__).parents[2] / "docs" / "gallery.md").read_text()
+    headings = [line for line in out.splitlines()[2:] if not line.startswith(" ")]
+    assert headings == re.findall(r"^## (.*)$", gallery, flags=re.M)
 
 
 def test_a_clip_goes_in_by_one_option_and_comes_out(command, tmp_path):
@@ -497,7 +515,7 @@ def test_progress_says_that_it_compiles_and_how_long_the_first_frame_took(capsys
     assert lines[0] == "compiling kernels (first run only) …"
     assert lines[1] == "first frame after 10.0 s"
     assert lines[2] == "frame 1/3  objective 0.125  hinge 28.6°  slide 0.25 m"
-    assert lines[3] == "frame 3/3  objective 0.125  hinge 28.6°  slide 0.25 m  1 s/frame  0 s left"
+    assert lines[3] == "frame 3/3  objective 0.125  hinge 28.6°  slide 0.25 m  0 s left"
     assert len(lines) == 4
 
 
@@ -528,3 +546,57 @@ def test_an_error_that_nobody_expected_is_one_line_and_its_traceback_with_debug(
     assert code == 1
     assert "Traceback (most recent call last)" in err
     assert re.search(said, err)
+
+
+def test_help_is_in_groups_with_whole_sentences_and_an_example(command):
+    code, out, _ = command("--help")
+    assert code == 0
+    assert re.findall(r"^([A-Z][a-z ]+):$", out, flags=re.M) == [
+        *("Options", "Make", "Look", "Take away", "Trust")
+    ]
+    assert "..." not in out.split("Options:")[1]
+    assert " ".join(out.split()).endswith("flowborne view runs/ns-block-drag-max")
+    assert command("-h") == (0, out, "")
+    code, out, _ = command("film", "-h")
+    assert code == 0
+    assert out.endswith(
+        "  Example:\n    flowborne film runs/eel --out eel.webp --set camera.orbit=30\n"
+    )
+
+
+@pytest.mark.parametrize("name", ["view", "film"])
+def test_a_scene_in_place_of_a_run_has_to_run_first(command, small_scene, tmp_path, name):
+    said = f"flowborne: {small_scene} is a scene, not the folder of a run; "
+    code, out, err = command(name, small_scene)
+    assert (code, out, err) == (2, "", f"{said}run it first: flowborne run {small_scene}\n")
+    assert command("run", small_scene, "--no-film", "--frames", 1)[0] == 0
+    code, _, err = command(name, small_scene)
+    assert (code, err) == (2, f"{said}give runs/small\n")
+    code, _, err = command(name, "eel")
+    assert code == 2
+    assert "eel is a scene, not the folder of a run; run it first: flowborne run eel\n" in err
+
+
+def test_a_duration_is_refused_with_the_frames_that_it_is(command, small_scene):
+    text = small_scene.read_text()
+    small_scene.write_text(text.replace("frames = 12", "duration = 3"))
+    code, _, err = command("check", small_scene)
+    assert code == 2
+    assert "[time]: unknown key 'duration'; give frames = 72, which is 3 s at frames_per" in err
+    small_scene.write_text(text.replace("frames = 12", "duration = 'long'"))
+    _, _, err = command("check", small_scene)
+    assert "unknown key 'duration'; give frames = duration times frames_per_second.\n" in err
+
+
+def test_a_warning_that_a_scene_accepts_is_a_note_with_the_reason(command, small_scene):
+    slow = ("--set", "control.0.probe=2.0", "--set", "control.0.strength=0.5")
+    text = small_scene.read_text()
+    small_scene.write_text(text + '\n[accepted_warnings]\nangles_in_radians = "it creeps"\n')
+    code, out, _ = command("check", small_scene, *slow, "--strict")
+    assert code == 0
+    assert "\nno warnings, 2 notes\n" in out
+    assert re.search(r"  note: .* 1: a strength of 0\.5 .*\. Accepted: it creeps\n", out)
+    small_scene.write_text(text + '\n[accepted_warnings]\nangles_in_radian = "it creeps"\n')
+    code, _, err = command("check", small_scene)
+    assert code == 2
+    assert "accepted_warnings: there is no warning 'angles_in_radian'; did you mean" in err

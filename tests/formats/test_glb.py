@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 import flowborne as fb
 from flowborne.formats.creature import Creature
 from flowborne.formats.glb import ExporterGlb
-from flowborne.runs.open_run import OpenRun
+from flowborne.view.open_run import OpenRun
 
 read_back = pytest.importorskip("read_back", exc_type=ImportError)
 

@@ -12,8 +12,8 @@ from vtkmodules.util.numpy_support import vtk_to_numpy
 
 import flowborne as fb
 from flowborne.formats.creature import Creature
-from flowborne.runs.open_run import OpenRun
 from flowborne.runs.states import cell_velocity, cell_vorticity
+from flowborne.view.open_run import OpenRun
 
 read_back = pytest.importorskip("read_back", exc_type=ImportError)
 

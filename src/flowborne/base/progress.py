@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from time import monotonic
 from typing import Literal
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, SpinnerColumn, TextColumn, TimeRemainingColumn
+from rich.progress import Progress as Bar
 
 Stage = Literal["clip", "start", "compiling", "frame", "film", "member"]
 
@@ -32,6 +35,7 @@ class RunProgress:
     kernels    number of kernels compiled so far
     warnings   number of warnings about the scene
     objective  after the frame; nan where there is none
+    unit       of the objective, "" where its terms have several
     joints     (column of the history, rad or m) of each controlled joint
     clip       which run of a batch begins; "" in other stages
     """
@@ -43,8 +47,13 @@ class RunProgress:
     kernels: int = 0
     warnings: int = 0
     objective: float = math.nan
+    unit: str = ""
     joints: tuple[tuple[str, float], ...] = ()
     clip: str = ""
+
+
+Progress = Callable[[RunProgress], None]
+"""What is called with each piece of news."""
 
 
 class ProgressDisplay:
@@ -52,7 +61,7 @@ class ProgressDisplay:
 
     def __init__(self) -> None:
         self._stream = sys.stderr
-        self._bar: Progress | None = None
+        self._bar: Bar | None = None
         self._started_at = 0
         self._first: float | None = None
         self._line_due = 0.0
@@ -60,7 +69,7 @@ class ProgressDisplay:
 
     def __enter__(self) -> ProgressDisplay:
         if self._stream.isatty():
-            self._bar = Progress(
+            self._bar = Bar(
                 SpinnerColumn(),
                 TextColumn("{task.description}", markup=False),
                 BarColumn(bar_width=24),
@@ -113,14 +122,12 @@ class ProgressDisplay:
             return f"run {news.frame}/{news.frames}"
         words = [f"frame {news.frame}/{news.frames}"]
         if not math.isnan(news.objective):
-            words.append(f"objective {news.objective:.4g}")
+            words.append(f"objective {news.objective:.4g} {news.unit}".rstrip())
         words += [_position(column, value) for column, value in news.joints[:3]]
         done = news.frame - self._started_at - 1
-        if done > 0 and self._first is not None:
+        if done > 0 and self._first is not None and self._bar is None:
             pace = (news.seconds - self._first) / done
-            words.append(f"{pace:.3g} s/frame")
-            if self._bar is None:
-                words.append(f"{pace * (news.frames - news.frame):.0f} s left")
+            words.append(f"{pace * (news.frames - news.frame):.0f} s left")
         return "  ".join(words)
 
     def say(self, text: str) -> None:
@@ -129,6 +136,16 @@ class ProgressDisplay:
             self._bar.console.print(text, markup=False, highlight=False)
         else:
             print(text, file=self._stream, flush=True)
+
+
+@contextmanager
+def displayed(progress: Progress | bool | None) -> Iterator[Progress | None]:
+    """Context with what is to be called with each piece of news: a new display for True."""
+    if progress is True:
+        with ProgressDisplay() as display:
+            yield display
+    else:
+        yield progress or None
 
 
 def _position(column: str, value: float) -> str:

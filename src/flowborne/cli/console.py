@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import sys
-from math import prod
 from typing import TYPE_CHECKING
 
 from flowborne.base.phrases import listed
+from flowborne.runs.run_folder import RunFolder
 
 if TYPE_CHECKING:
-    from flowborne.coupling.world import Setup
-    from flowborne.scenes.schema import Scene
     from flowborne.sim.running import RunResult
     from flowborne.studies.batch_page import Batch
 
@@ -19,24 +17,15 @@ LONGEST = 1000
 """Letters of a message, of which more are left out in its middle."""
 
 
-MOST_STARTED = 4_000_000
-"""Cells of the largest grid that `check` cuts and on which it starts bodies and fluid: that takes
-some seconds and 2 GB."""
-
-
-def is_started(setup: Setup) -> bool:
-    """Whether `check` starts the bodies and the fluid of a scene."""
-    return setup.fluid is None or prod(setup.fluid.grid.shape) <= MOST_STARTED
-
-
-def run_lines(result: RunResult) -> str:
-    """A finished run in a few lines."""
+def run_lines(result: RunResult, *, film: bool) -> str:
+    """A finished run in a few lines; `film`: whether one was to be drawn."""
     summary = result.summary
     lines = [result.message]
     for column, value in summary["final_mean"].items():
         lines.append(f"  {column}: {value:.4f} (mean of the last frames)")
     if summary["final_objective"] is not None:
-        lines.append(f"  objective: {summary['final_objective']:.4g} (mean of the last decisions)")
+        value = f"{summary['final_objective']:.4g} {summary['objective_unit']}".rstrip()
+        lines.append(f"  objective: {value} (mean of the last decisions)")
     if summary["converged_frame"] is not None:
         lines.append(f"  converged at frame {summary['converged_frame']}")
     pace = f"  {summary['seconds_per_frame']:.3g} s per frame"
@@ -44,7 +33,9 @@ def run_lines(result: RunResult) -> str:
         pace += f", {summary['bytes_per_cell']:.0f} bytes per cell"
     if summary["peak_memory_bytes"] is not None:
         pace += f", {summary['peak_memory_bytes'] / 1e6:.0f} MB at most"
-    return "\n".join([*lines, pace])
+    path = RunFolder(result.folder).film
+    drawn = [f"  film: {path}"] if film and path.exists() else []
+    return "\n".join([*lines, pace, *drawn, f"  look at it: flowborne view {result.folder}"])
 
 
 def batch_lines(batch: Batch) -> list[str]:
@@ -59,31 +50,6 @@ def batch_lines(batch: Batch) -> list[str]:
     ]
     skipped = [f"skipped, not BVH: {listed(batch.skipped)}"] if batch.skipped else []
     return [*lines, *skipped, f"page: {batch.page}"]
-
-
-def check_lines(scene: Scene, setup: Setup, warnings: list[str]) -> str:
-    """What there is to say of a scene that can be run."""
-    from flowborne.scenes.creature import creature_of
-    from flowborne.scenes.notes import notes_of
-    from flowborne.scenes.seen import seen_bodies
-    from flowborne.scenes.warn import headline
-
-    started = is_started(setup)
-    creature = creature_of(scene, setup, on_grid=started)
-    later = (
-        f"  not started, as the grid has more than {MOST_STARTED:,} cells; a run starts bodies and "
-        "fluid first"
-    )
-    return "\n".join(
-        [
-            *([] if creature is None else creature.lines()),
-            headline(warnings),
-            *([] if started else [later]),
-            *(f"  warning: {warning}" for warning in warnings),
-            *(f"  {note}" for note in notes_of(scene, setup.solid)),
-            *(f"  {seen.sentence()}" for seen in seen_bodies(setup)),
-        ]
-    )
 
 
 def sentence_of(error: Exception) -> str:

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flowborne.base.errors import PartError
+from flowborne.base.one_line import one_line
 from flowborne.control import creature
 from flowborne.control.course import Course, Step, Trials
 from flowborne.control.executors import Mapper, Threads
@@ -101,6 +102,8 @@ class Controller:
     raises      ValueError for no, negative or repeated dofs, a strength that is not positive and
                 finite or not one per dof, every < 1 or iterations < 1
     """
+
+    __repr__ = one_line
 
     dofs: Integers
     objective: ObjectiveSum

@@ -17,6 +17,7 @@ from weakref import ref
 import numpy as np
 
 from flowborne.base.errors import BreakdownError, PartError, WorkerError
+from flowborne.base.one_line import one_line
 from flowborne.coupling.world import World
 from flowborne.kernels.arrays import Array, Integers
 from flowborne.solids.sensed import Sensed
@@ -173,6 +174,8 @@ class StepReport:
     unsettled        (k,) dofs whose contacts, joint limits or drives still changed when the step
                      gave up; none when Coriolis forces alone did
     """
+
+    __repr__ = one_line
 
     dt: Annotated[float, Joined(sum)]
     outcome: Annotated[Outcome, Joined(last)]

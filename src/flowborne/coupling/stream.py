@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import map_coordinates
 
+from flowborne.base.one_line import one_line
 from flowborne.coupling.cut import cut_by_bodies
 from flowborne.coupling.world import World
 from flowborne.fluid.grid import Grid
@@ -83,6 +84,8 @@ class FlowState:
     velocity  (n, 3) m/s
     pressure  (n,) dynamic pressure, Pa; nan where no fluid is within a cell
     """
+
+    __repr__ = one_line
 
     velocity: Array
     pressure: Array

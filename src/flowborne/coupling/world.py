@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from flowborne.base.one_line import one_line
 from flowborne.coupling.band import Band, Projection
 from flowborne.coupling.fractions import Geometry
 from flowborne.coupling.mouths import Mouth
@@ -52,6 +53,8 @@ class Fluid:
     raises        ValueError when the grid is to move across sides beyond which there is no fluid
     """
 
+    __repr__ = one_line
+
     grid: Grid
     density: float
     viscosity: float = 0.0
@@ -91,6 +94,8 @@ class Setup:
              each step; else when its report is asked for it, and the matrix is then made again
     basis    a setup of the same bodies on the same grid, whose shapes are those of this one
     """
+
+    __repr__ = one_line
 
     solid: SolidModel
     fluid: Fluid | None = None
@@ -165,6 +170,8 @@ class World:
     splitting
             make the added-mass part of forces, for each part of the last step; likewise
     """
+
+    __repr__ = one_line
 
     setup: Setup
     solid: SolidState

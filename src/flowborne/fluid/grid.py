@@ -49,6 +49,9 @@ class Grid:
     spacing: float
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
+    def __str__(self) -> str:
+        return " x ".join(str(self.shape[axis]) for axis in self.axes) + " cells"
+
     @classmethod
     def slab(cls, nx: int, ny: int, spacing: float, origin: tuple[float, float]) -> Grid:
         """Two-dimensional grid of nx by ny cells with its lower left corner at `origin`."""

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from flowborne.base.one_line import one_line
 from flowborne.fluid.grid import Grid, faces_of
 from flowborne.kernels.arrays import Array, Faces
 
@@ -35,6 +36,8 @@ class FluidState:
     sea                (3,) velocity of the sea, m/s; empty before the first step and without one
     scalars            c^n, name -> (nx, ny, nz): dye and smoke
     """
+
+    __repr__ = one_line
 
     velocity: Faces
     velocity_change: Faces

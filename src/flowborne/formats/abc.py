@@ -19,7 +19,7 @@ from flowborne.base.version import __version__
 from flowborne.formats.creature import Creature
 from flowborne.kernels.arrays import Array, Integers
 from flowborne.runs.exporters import provided
-from flowborne.runs.open_run import OpenRun
+from flowborne.runs.open_run import StoredRun
 
 Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 """Rotation from z up to y up."""
@@ -30,7 +30,7 @@ Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 class ExporterAbc:
     """Rigid geometries under animated transforms, and flesh as a mesh that deforms."""
 
-    def write(self, run: OpenRun, path: Path) -> None:
+    def write(self, run: StoredRun, path: Path) -> None:
         optional("alembic3d", "alembic3d", "alembic", f"'{path.suffix}' files")
         creature = Creature(run)
         with replaced_whole(path) as new:

@@ -13,7 +13,7 @@ from flowborne.kernels.arrays import Array
 from flowborne.motion.bvh import write_clip
 from flowborne.motion.clip import Clip
 from flowborne.runs.exporters import Written, provided
-from flowborne.runs.open_run import OpenRun
+from flowborne.runs.open_run import StoredRun
 from flowborne.scenes.motion_out import export_bvh
 
 UNIT = 0.01
@@ -33,10 +33,10 @@ class ExporterBvh:
     of the run, lengths are in centimetres and y is up.
     """
 
-    def write(self, run: OpenRun, path: Path) -> Written | None:
+    def write(self, run: StoredRun, path: Path) -> Written | None:
         if len(run) < 2:
             raise SceneError(f"{run.folder} has no motion yet. Continue the run with --resume.")
-        if "clip" in run.scene:
+        if "clip" in run.tables:
             return Written((path,), export_bvh(run.folder, path))
         creature = Creature(run)
         clip, positions = _clip_of(creature)

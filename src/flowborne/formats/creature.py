@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from flowborne.base.errors import SceneError
 from flowborne.kernels.arrays import Array, Integers
-from flowborne.runs.open_run import OpenRun
+from flowborne.runs.open_run import StoredRun
 from flowborne.runs.recorder import on_skin
 from flowborne.scenes.bodies import load_model
 from flowborne.scenes.load import read_scene
@@ -97,7 +97,7 @@ class Creature:
     raises  SceneError if the run has no bodies, or its model cannot be read
     """
 
-    def __init__(self, run: OpenRun) -> None:
+    def __init__(self, run: StoredRun) -> None:
         if not has_bodies(run):
             raise SceneError(f"{run.folder} has no bodies. Add [solids] or [human] to its scene.")
         self.run, self.model = run, load_model(read_scene(run.folder / "scene.toml"))
@@ -201,9 +201,9 @@ class Creature:
         return float(np.ptp(every, axis=0).max())
 
 
-def has_bodies(run: OpenRun) -> bool:
+def has_bodies(run: StoredRun) -> bool:
     """Whether the scene of a run has a model."""
-    return not {"solids", "human"}.isdisjoint(run.scene)
+    return not {"solids", "human"}.isdisjoint(run.tables)
 
 
 def quaternions(rotation: Array) -> Array:

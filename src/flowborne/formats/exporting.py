@@ -8,8 +8,8 @@ from typing import Any
 
 from flowborne.base.errors import PartError, SceneError
 from flowborne.runs.exporters import EXPORTERS, Written, can_write, endings
-from flowborne.runs.open_run import OpenRun
 from flowborne.runs.run_folder import RunFolder, RunFolderError
+from flowborne.view.open_run import OpenRun
 
 
 def export(

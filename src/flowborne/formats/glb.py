@@ -19,7 +19,7 @@ from flowborne.formats.morphs import morphed, strongest
 from flowborne.kernels.arrays import Array, Integers
 from flowborne.motion.quaternions import continuous
 from flowborne.runs.exporters import Written, provided
-from flowborne.runs.open_run import OpenRun
+from flowborne.runs.open_run import StoredRun
 
 with suppress(ImportError):  # the list of exporters imports this module without the library too
     import pygltflib as gl
@@ -54,7 +54,7 @@ class ExporterGlb:
         if self.targets < 0:
             raise ValueError(f"targets is {self.targets}. Give 0 or more")
 
-    def write(self, run: OpenRun, path: Path) -> Written:
+    def write(self, run: StoredRun, path: Path) -> Written:
         optional("pygltflib", "pygltflib", "gltf", f"'{path.suffix}' files")
         creature = Creature(run)
         file, notes = _File(run.name, run.frames_per_second), []

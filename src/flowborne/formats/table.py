@@ -14,13 +14,13 @@ from flowborne.base.atomic import replaced_whole, write_text
 from flowborne.base.extras import optional
 from flowborne.runs.exporters import provided
 from flowborne.runs.history import unit_of
-from flowborne.runs.open_run import OpenRun
+from flowborne.runs.open_run import StoredRun
 
 COUNTS = ("frame", "solver_iterations", "sweeps", "contacts", "flesh_inside_out")
 """Columns of integers."""
 
 
-def _columns(run: OpenRun) -> dict[str, NDArray[np.generic]]:
+def _columns(run: StoredRun) -> dict[str, NDArray[np.generic]]:
     """The history, with counts as integers."""
     return {
         name: values.astype(np.int64) if name in COUNTS and np.isfinite(values).all() else values
@@ -33,7 +33,7 @@ def _columns(run: OpenRun) -> dict[str, NDArray[np.generic]]:
 class ExporterCsv:
     """A row per frame, with the columns of history.csv; names end in units, numbers are exact."""
 
-    def write(self, run: OpenRun, path: Path) -> None:
+    def write(self, run: StoredRun, path: Path) -> None:
         columns = _columns(run)
         text = io.StringIO()
         table = csv.writer(text, lineterminator="\n")
@@ -51,7 +51,7 @@ class ExporterParquet:
     impulses, work and volumes are per metre of depth.
     """
 
-    def write(self, run: OpenRun, path: Path) -> None:
+    def write(self, run: StoredRun, path: Path) -> None:
         arrow = optional("pyarrow", "pyarrow", "parquet", "'.parquet' files")
         parquet = optional("pyarrow.parquet", "pyarrow", "parquet", "'.parquet' files")
         columns = _columns(run)

@@ -32,7 +32,7 @@ from flowborne.formats.vdb import write_states
 from flowborne.kernels.arrays import Array, Integers
 from flowborne.motion.quaternions import continuous
 from flowborne.runs.exporters import Written, provided
-from flowborne.runs.open_run import OpenRun
+from flowborne.runs.open_run import StoredRun
 
 with suppress(ImportError):  # the list of exporters imports this module without the library too
     from pxr import Gf, Kind, Sdf, Tf, Usd, UsdGeom, UsdShade, UsdSkel, UsdVol, Vt
@@ -71,7 +71,7 @@ class ExporterUsd:
     Dye is in separate files: swim.usd refers to swim_dye/swim_0000.vdb and so on.
     """
 
-    def write(self, run: OpenRun, path: Path) -> Written:
+    def write(self, run: StoredRun, path: Path) -> Written:
         optional("pxr.Usd", "usd-core", "usd", f"'{path.suffix}' files")
         creature, volumes = Creature(run), tuple[Path, ...]()
         if run.dyes:
@@ -196,7 +196,7 @@ def _paths(stage: Usd.Stage, creature: Creature) -> None:
         _set_points(curves, positions.reshape(-1, 3))
 
 
-def _dye(stage: Usd.Stage, run: OpenRun, volumes: Sequence[str]) -> None:
+def _dye(stage: Usd.Stage, run: StoredRun, volumes: Sequence[str]) -> None:
     """Write a volume for each dye, which refers to a file per frame."""
     if run.grid is None or not volumes:
         return

@@ -24,7 +24,7 @@ from flowborne.base.atomic import write_atomically
 from flowborne.base.errors import SceneError
 from flowborne.kernels.arrays import Integers, Mask, Single
 from flowborne.runs.exporters import Written, provided
-from flowborne.runs.open_run import OpenRun
+from flowborne.runs.open_run import StoredRun
 from flowborne.runs.states import cell_velocity
 
 Number = TypeVar("Number", np.bool_, np.float32)
@@ -52,13 +52,13 @@ class ExporterVdb:
     state.
     """
 
-    def write(self, run: OpenRun, path: Path) -> Written:
+    def write(self, run: StoredRun, path: Path) -> Written:
         if run.grid is None:
             raise SceneError(f"{run.folder} has no flow: {_without_flow(run)}.")
         return Written(write_states(run, path, velocity=True))
 
 
-def write_states(run: OpenRun, path: Path, *, velocity: bool) -> tuple[Path, ...]:
+def write_states(run: StoredRun, path: Path, *, velocity: bool) -> tuple[Path, ...]:
     """Write a file for each state, named like `path`, with the dyes, and the velocity if asked for;
     returns the files."""
     files = tuple(path.with_name(f"{path.stem}_{n:04d}{path.suffix}") for n in run.frames)
@@ -77,9 +77,9 @@ def write_states(run: OpenRun, path: Path, *, velocity: bool) -> tuple[Path, ...
     return files
 
 
-def _without_flow(run: OpenRun) -> str:
+def _without_flow(run: StoredRun) -> str:
     """Why a run has no grid, and how to get one."""
-    if "fluid" in run.scene and "domain" in run.scene:
+    if "fluid" in run.tables and "domain" in run.tables:
         return (
             "its scene leaves the fluid out by fluid.coupling = 'none'. Run it with 'one-way' or "
             "'two-way'"

@@ -31,7 +31,7 @@ from flowborne.formats.creature import Creature, has_bodies
 from flowborne.kernels.arrays import Array, Integers
 from flowborne.kernels.elastic import STABLE_NEO_HOOKEAN
 from flowborne.runs.exporters import provided
-from flowborne.runs.open_run import OpenRun
+from flowborne.runs.open_run import StoredRun
 from flowborne.runs.states import cell_velocity, cell_vorticity
 from flowborne.solids.elasticity import Elasticity
 from flowborne.solids.elements import shape_gradients
@@ -56,13 +56,13 @@ QUADRATIC = {6: (22, (0, 1, 2, 3, 5, 4)), 10: (24, (0, 1, 2, 3, 4, 7, 5, 6, 8, 9
 class ExporterVtkHdf:
     """Blocks fluid, bodies, forces and flesh, each if the run has it."""
 
-    def write(self, run: OpenRun, path: Path) -> None:
+    def write(self, run: StoredRun, path: Path) -> None:
         h5py = optional("h5py", "h5py", "vtk", f"'{path.suffix}' files")
         with replaced_whole(path) as new, h5py.File(new, "w") as file:
             _write_blocks(run, file)
 
 
-def _write_blocks(run: OpenRun, file: h5py.File) -> None:
+def _write_blocks(run: StoredRun, file: h5py.File) -> None:
     """Write the run into an open file. Raises SceneError if it has neither fluid nor bodies."""
     import h5py
 
@@ -87,7 +87,7 @@ def _write_blocks(run: OpenRun, file: h5py.File) -> None:
         tree[name] = h5py.SoftLink(f"/VTKHDF/{name}")
 
 
-def _fluid(group: h5py.Group, run: OpenRun) -> None:
+def _fluid(group: h5py.Group, run: StoredRun) -> None:
     """Write the fields of the cells; a step is a slice of each array."""
     _set_type(group, "ImageData")
     start, origins = run.grid_at({}), run.origins()
@@ -154,7 +154,7 @@ def _bodies(group: h5py.Group, creature: Creature) -> None:
             group["Points"][first + start : first + end] = vertices
 
 
-def _forces(group: h5py.Group, run: OpenRun) -> None:
+def _forces(group: h5py.Group, run: StoredRun) -> None:
     """Write a vertex for each body with the force on it."""
     count = len(run.bodies) - 1
     steps = _poly(group, run, count, {"Vertices": np.arange(count)[:, None]})
@@ -165,7 +165,7 @@ def _forces(group: h5py.Group, run: OpenRun) -> None:
     steps.create_group("PointDataOffsets")["force"] = count * np.arange(len(run))
 
 
-def _flesh(group: h5py.Group, run: OpenRun, model: SolidModel, flesh: Flesh) -> None:
+def _flesh(group: h5py.Group, run: StoredRun, model: SolidModel, flesh: Flesh) -> None:
     """Write the elements of flesh with their stresses."""
     _set_type(group, "UnstructuredGrid")
     kind, order = QUADRATIC[flesh.elements.shape[1]]
@@ -204,7 +204,7 @@ def _set_type(group: h5py.Group, name: str) -> None:
     group.attrs["Type"] = np.bytes_(name)
 
 
-def _steps(group: h5py.Group, run: OpenRun) -> h5py.Group:
+def _steps(group: h5py.Group, run: StoredRun) -> h5py.Group:
     """A new group of time steps."""
     steps = group.create_group("Steps")
     steps.attrs["NSteps"] = len(run)
@@ -212,7 +212,7 @@ def _steps(group: h5py.Group, run: OpenRun) -> h5py.Group:
     return steps
 
 
-def _points(group: h5py.Group, run: OpenRun, count: int) -> h5py.Group:
+def _points(group: h5py.Group, run: StoredRun, count: int) -> h5py.Group:
     """Allocate `count` points per step; returns the group of steps, which refers to them."""
     states = len(run)
     steps = _steps(group, run)
@@ -226,7 +226,9 @@ def _points(group: h5py.Group, run: OpenRun, count: int) -> h5py.Group:
     return steps
 
 
-def _poly(group: h5py.Group, run: OpenRun, count: int, cells: Mapping[str, Integers]) -> h5py.Group:
+def _poly(
+    group: h5py.Group, run: StoredRun, count: int, cells: Mapping[str, Integers]
+) -> h5py.Group:
     """Allocate a surface of `count` points with `cells`: kind -> points (m, k) of each cell."""
     _set_type(group, "PolyData")
     steps = _points(group, run, count)

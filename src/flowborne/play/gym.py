@@ -47,6 +47,8 @@ from flowborne.solids.sensors import sensor_columns
 
 __all__ = ["ENVIRONMENTS", "SceneEnv"]
 
+__dir__ = __all__.copy
+
 gymnasium = optional("gymnasium", "Gymnasium", "gym", "environments")
 
 ENVIRONMENTS = {

@@ -9,6 +9,7 @@ import numpy as np
 
 from flowborne.kernels.arrays import Array
 from flowborne.play.playing import Moment, Play
+from flowborne.runs.history import HistoryColumns
 from flowborne.runs.run_folder import RunFolder
 from flowborne.sim.running import write_state_alone
 from flowborne.view.run import Run, State
@@ -66,7 +67,9 @@ class PlayedRun(Run):
         """Make the history that of the frames now."""
         rows = [moment.row for moment in self.moments if moment.frame > 0]
         columns = self.moments[-1].row
-        self.history = {name: np.array([row[name] for row in rows]) for name in columns}
+        self.history = HistoryColumns(
+            {name: np.array([row[name] for row in rows]) for name in columns}
+        )
 
     def _index(self, times: Array) -> None:
         """Number the frames from the first one; `times`: (n,) s, of all of them."""

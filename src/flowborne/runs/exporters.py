@@ -10,7 +10,7 @@ from pkgutil import iter_modules
 from typing import NamedTuple, Protocol, TypeVar
 
 from flowborne.base.registry import Registry
-from flowborne.runs.open_run import OpenRun
+from flowborne.runs.open_run import StoredRun
 
 Class = TypeVar("Class", bound=type)
 
@@ -32,7 +32,7 @@ class Written(NamedTuple):
 class Exporter(Protocol):
     """Writes a run as a file."""
 
-    def write(self, run: OpenRun, path: Path) -> Written | None:
+    def write(self, run: StoredRun, path: Path) -> Written | None:
         """Write the whole run to `path`; None stands for that one file and no note."""
         ...
 

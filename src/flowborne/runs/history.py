@@ -14,6 +14,7 @@ import numpy as np
 
 from flowborne.base.atomic import write_text
 from flowborne.base.given import MOST_BYTES, check_file
+from flowborne.base.phrases import suggestion
 from flowborne.kernels.arrays import Array
 from flowborne.runs.states import Quantity
 
@@ -198,10 +199,25 @@ def history_rows(path: Path, columns: Sequence[str]) -> Iterator[tuple[float, ..
                 yield tuple(float(cells[index]) for index in indices)
 
 
-def read_history(path: Path, columns: Sequence[str]) -> dict[str, Array]:
+class UnknownColumnError(KeyError):
+    """There is no such column; the text says which was probably meant."""
+
+    __str__ = Exception.__str__
+
+
+class HistoryColumns(dict[str, Array]):
+    """Column -> (frames,) numbers. An unknown column raises UnknownColumnError."""
+
+    def __missing__(self, name: str) -> Array:
+        raise UnknownColumnError(
+            f"no column '{name}' in the history{suggestion(name, self, 'It has')}"
+        )
+
+
+def read_history(path: Path, columns: Sequence[str]) -> HistoryColumns:
     """Column -> (frames,) numbers of the named columns. Raises ValueError as `history_rows`."""
     rows = np.array(list(history_rows(path, columns)), float).reshape(-1, len(columns))
-    return dict(zip(columns, rows.T, strict=True))
+    return HistoryColumns(zip(columns, rows.T, strict=True))
 
 
 def _lines(file: IO[str]) -> Iterator[str]:

@@ -1,4 +1,4 @@
-"""A run folder opened for reading: common data of all frames, and single frames on request."""
+"""A run folder read lazily: common data of all frames, and single frames on request."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from flowborne.base.extras import optional
 from flowborne.base.given import read_json
 from flowborne.fluid.grid import Grid
 from flowborne.kernels.arrays import Array, Integers
-from flowborne.runs.history import history_arrays, history_columns, read_history
+from flowborne.runs.history import HistoryColumns, history_arrays, history_columns, read_history
 from flowborne.runs.run_folder import RunFolder, RunFolderError, reading
 from flowborne.runs.states import DYE, Arrays, StateArray, quantity, read_state
 
@@ -23,30 +23,19 @@ if TYPE_CHECKING:
     import xarray
 
 
-class OpenRun:
-    """The results of a run, read lazily, in SI units and radians.
+class StoredRun:
+    """The results of a run, with the attributes of `view.open_run.OpenRun`.
 
-    folder  of the run
     raises  RunFolderError when it is not the folder of a run, or has no state yet
-
-    scene              the scene as run: its file as nested dictionaries
-    name               of the scene
-    bodies             names of the bodies, the world first
-    joints             names of the joints
-    dyes               names of the dyes
-    frames             frame number of each state, 0 for the start
-    frames_per_second  of the run
-    is_slab            whether it is two-dimensional, with forces per metre of depth
-    grid               of the fluid at the start; None without a fluid
     """
 
     def __init__(self, folder: str | Path) -> None:
         files = RunFolder.existing(Path(folder))
         self.folder = files.path
-        self.scene = files.read_scene()
+        self.tables = files.read_scene()
         with reading(self.folder):
             self._model: dict[str, Any] = read_json(files.model)
-            self.name = str(self.scene.get("name", files.path.name))
+            self.name = str(self.tables.get("name", files.path.name))
             self.bodies: tuple[str, ...] = tuple(self._model["bodies"])
             self.joints: tuple[str, ...] = tuple(self._model["joints"])
             self.frames_per_second = float(self._model["frames_per_second"])
@@ -73,8 +62,11 @@ class OpenRun:
         return None if entry is None else np.asarray(entry["triangles"], np.int64)
 
     @cached_property
-    def history(self) -> dict[str, Array]:
-        """column -> (frames,) numbers of history.csv; the column name ends with the unit."""
+    def history(self) -> HistoryColumns:
+        """column -> (frames,) numbers of history.csv; the column name ends with the unit.
+
+        raises  KeyError for an unknown column, with the one that was probably meant
+        """
         with reading(self.folder):
             path = RunFolder(self.folder).history
             return read_history(path, history_columns(path))
@@ -112,7 +104,7 @@ class OpenRun:
     @property
     def window_axes(self) -> tuple[int, ...]:
         """Axes along which the domain follows bodies; none if it stays where it is."""
-        domain = self.scene.get("domain", {})
+        domain = self.tables.get("domain", {})
         if self.grid is None or domain.get("follow", "nothing") == "nothing":
             return ()
         along = domain.get("along")
@@ -174,12 +166,3 @@ def _grid(entry: dict[str, Any] | None) -> Grid | None:
     nx, ny, nz = entry["shape"]
     x, y, z = entry["origin"]
     return Grid((nx, ny, nz), float(entry["spacing"]), (x, y, z))
-
-
-def open_run(folder: str | Path) -> OpenRun:
-    """The results of a run: times, poses, skin of flesh, fields and history, read lazily.
-
-    folder  of a run, which may still be in progress
-    raises  RunFolderError when it is not the folder of a run, or has no state yet
-    """
-    return OpenRun(folder)

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from flowborne.base.phrases import suggestion
 from flowborne.control.surroundings import Surroundings
 from flowborne.coupling.world import Setup
 from flowborne.motion.clip import Clip
@@ -22,6 +23,7 @@ from flowborne.scenes.motions import MotionFormulaTable, check_formulas, check_m
 from flowborne.scenes.mouths import check_mouth_cells, check_mouths
 from flowborne.scenes.schema_bodies import ROOT, ClipTable, named_holds
 from flowborne.scenes.thrusters import check_discs, check_thrusters, thrusters_of
+from flowborne.scenes.warn import KINDS
 from flowborne.solids.loops import tied_joints
 from flowborne.solids.model import HINGE, SLIDE, SolidModel, joint_kind, joint_unit
 from flowborne.solids.surfaces import geom_boxes
@@ -42,7 +44,12 @@ MANY = 10
 def cross_check(draft: Draft) -> list[str]:
     """Everything that is wrong with a scene that the schema accepts."""
     scene = draft.scene
-    problems = [*check_dimensions(draft), *check_fluid(draft), *check_without_bodies(draft)]
+    problems = [
+        *check_accepted(draft),
+        *check_dimensions(draft),
+        *check_fluid(draft),
+        *check_without_bodies(draft),
+    ]
     has_model = scene.solids is not None
     flesh = check_flesh(draft, scene.flesh, slab=scene.is_slab, has_model=has_model)
     earlier = draft.failing(lambda: earlier_of(scene), "earlier")
@@ -73,6 +80,14 @@ def cross_check(draft: Draft) -> list[str]:
         *check_mouth_cells(draft, mouths_of(scene, model), setup, start),
         *check_discs(draft, discs, setup, start),
     ]
+
+
+def check_accepted(draft: Draft) -> Iterator[str]:
+    """Warnings that the scene accepts and that are none."""
+    for kind in draft.scene.accepted_warnings:
+        if kind not in KINDS:
+            end = suggestion(kind, KINDS, "Give one of")
+            yield f"{draft.at('accepted_warnings')}: there is no warning '{kind}'{end}"
 
 
 NEEDS_BODIES = (

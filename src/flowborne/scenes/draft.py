@@ -12,7 +12,7 @@ from pydantic_core import ErrorDetails
 from flowborne.base.errors import SceneError
 from flowborne.base.phrases import suggestion
 from flowborne.base.tables import BUILT_IN, OWN, OwnTable, Table
-from flowborne.scenes.schema import Scene
+from flowborne.scenes.schema import Scene, TimeTable
 
 Key = str | int
 
@@ -146,6 +146,8 @@ def explain(error: ErrorDetails, raw: Any, file: str, root: type[Table] = Scene)
     where, around = place(file, keys, root=root), place(file, keys[:-1], root=root)
     if kind == "extra_forbidden":
         name = str(keys[-1])
+        if keys == ("time", "duration"):
+            return f"{around}: unknown key 'duration'; {_frames_for(raw['time'])}"
         end = suggestion(name, _allowed(keys[:-1], raw, root), "The keys here are")
         return f"{around}: unknown key '{name}'{end}"
     if kind == "missing":
@@ -169,6 +171,15 @@ def explain(error: ErrorDetails, raw: Any, file: str, root: type[Table] = Scene)
         return f"{around}: [{keys[0]}] may be there several times. Write [[{keys[0]}]]."
     what = WHAT.get(kind, f"is not right ({error['msg'].lower()}). Correct it")
     return f"{where}: {_shown(value)} {what}."
+
+
+def _frames_for(time: dict[str, Any]) -> str:
+    """How to give a duration, in s, of the table [time]."""
+    rate = time.get("frames_per_second", TimeTable().frames_per_second)
+    if not all(isinstance(n, int | float) and 0 < n < 1e9 for n in (rate, time["duration"])):
+        return "give frames = duration times frames_per_second."
+    frames = max(1, round(time["duration"] * rate))
+    return f"give frames = {frames}, which is {frames / rate:g} s at frames_per_second = {rate:g}."
 
 
 def _shown(value: Any) -> str:

@@ -133,6 +133,8 @@ class Scene(Table):
     constants    name -> number, for the formulas of [[motion]], [[actuator]], [[mouths]], [[force]]
                  and [[thruster]]
     plugins      Python files in the scene's folder that register parts of the user
+    accepted_warnings  kind of a warning -> why the scene is as it is; `check` gives the warning as
+                 a note, with this reason
     """
 
     name: PlainName
@@ -142,6 +144,7 @@ class Scene(Table):
     gravity: Vector = (0.0, 0.0, 0.0)
     constants: dict[str, Number] = Field(default_factory=dict)
     plugins: tuple[FileName, ...] = ()
+    accepted_warnings: dict[str, Text] = Field(default_factory=dict)
     time: TimeTable = TimeTable()
     domain: Domain | None = None
     fluid: FluidTable | None = None
@@ -179,6 +182,15 @@ class Scene(Table):
         if isinstance(data, dict) and "domain" in data:
             return {"fluid": {}, "boundaries": {}, **data}
         return data
+
+    def __repr__(self) -> str:
+        grid = self.domain.grid() if self.domain is not None and self.has_fluid else "no fluid"
+        return (
+            f"Scene '{self.name}': {self.dimensions}D, {grid}, {self.time.frames} frames of "
+            f"{self.frame_time:.4g} s"
+        )
+
+    __str__ = __repr__
 
     @property
     def has_bodies(self) -> bool:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
@@ -28,6 +28,7 @@ from flowborne.scenes.warn_bodies import (
     fixed_outside,
     floors_in_fluid,
     implausible_density,
+    leaking_bodies,
     lost_in_domain,
     mass_apart,
     only_to_see,
@@ -151,6 +152,7 @@ Warn = Callable[[Scene, Setup], Iterator[str]]
 """Warnings of one kind about a scene and what was built of it."""
 
 WARNINGS: tuple[Warn, ...] = (
+    leaking_bodies,
     thin_bodies,
     lost_in_domain,
     implausible_density,
@@ -176,12 +178,28 @@ WARNINGS: tuple[Warn, ...] = (
 """In the order in which they are listed."""
 
 
+KINDS: dict[str, Warn] = {warn.__name__: warn for warn in WARNINGS}
+"""Name of each kind, as in [accepted_warnings]."""
+
+
 def warnings_of(scene: Scene, setup: Setup) -> list[str]:
-    """All warnings about a scene, the same before, during and after a run."""
-    return [warning for warn in WARNINGS for warning in warn(scene, setup)]
+    """All warnings about a scene that it does not accept, the same before, during and after a
+    run."""
+    kinds = [warn for kind, warn in KINDS.items() if kind not in scene.accepted_warnings]
+    return [warning for warn in kinds for warning in warn(scene, setup)]
 
 
-def headline(warnings: list[str]) -> str:
-    """How many there are: "2 warnings", or "nothing wrong" without any."""
-    count = len(warnings)
-    return f"{count} warning{'s' * (count > 1)}" if count else "nothing wrong"
+def accepted_of(scene: Scene, setup: Setup) -> list[str]:
+    """The warnings that the scene accepts, each with its reason, as notes."""
+    return [
+        f"{warning}. Accepted: {why}"
+        for kind, why in scene.accepted_warnings.items()
+        for warning in KINDS[kind](scene, setup)
+    ]
+
+
+def headline(warnings: Sequence[str], notes: Sequence[str]) -> str:
+    """How many there are: "2 warnings", or "no warnings, 1 note"."""
+    count, more = len(warnings), len(notes)
+    said = f"{count or 'no'} warning{'s' * (count != 1)}"
+    return f"{said}, {more} note{'s' * (more > 1)}" if more else said

@@ -37,24 +37,30 @@ MOST_CELLS_ALONG = 10**6
 """Cells along a side that no machine holds, whatever the others are."""
 
 
+def leaking_bodies(scene: Scene, setup: Setup) -> Iterator[str]:
+    """Bodies that fluid passes through."""
+    bodies = [body for body in seen_bodies(setup) if not body.tight]
+    yield from _too_thin(scene, setup, bodies, "fluid passes through it")
+
+
 def thin_bodies(scene: Scene, setup: Setup) -> Iterator[str]:
-    """Bodies that fluid passes through, and those of fewer cells than LEAST_CELLS."""
-    if setup.fluid is None or scene.domain is None:
-        return
-    h = setup.fluid.grid.spacing
-    seen = seen_bodies(setup)
-    leaking = [body for body in seen if not body.tight]
+    """Bodies of fewer cells than LEAST_CELLS that fluid does not pass through."""
+    h = 0.0 if setup.fluid is None else setup.fluid.grid.spacing
     least = LEAST_CELLS * h * (1.0 - 1e-9)
-    thin = [body for body in seen if body.tight and body.thickness < least]
-    for bodies, harm in (
-        (leaking, "fluid passes through it"),
-        (thin, f"below {LEAST_CELLS:g} cells the flow is not reliable"),
-    ):
-        if bodies:
-            worst = min(bodies, key=lambda body: body.thickness)
-            more = f" ({len(bodies) - 1} more too)" if len(bodies) > 1 else ""
-            remedy = _remedy(scene, setup, worst.thickness)
-            yield f"[domain]: {_size(worst, h)}, and {harm}{more}; {remedy}"
+    bodies = [body for body in seen_bodies(setup) if body.tight and body.thickness < least]
+    yield from _too_thin(
+        scene, setup, bodies, f"below {LEAST_CELLS:g} cells the flow is not reliable"
+    )
+
+
+def _too_thin(scene: Scene, setup: Setup, bodies: list[Seen], harm: str) -> Iterator[str]:
+    """What to do about bodies, if any: the thinnest of them."""
+    if not bodies or setup.fluid is None or scene.domain is None:
+        return
+    worst = min(bodies, key=lambda body: body.thickness)
+    more = f" ({len(bodies) - 1} more too)" if len(bodies) > 1 else ""
+    remedy = _remedy(scene, setup, worst.thickness)
+    yield f"[domain]: {_size(worst, setup.fluid.grid.spacing)}, and {harm}{more}; {remedy}"
 
 
 def _size(body: Seen, h: float) -> str:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from flowborne.base.one_line import one_line
 from flowborne.coupling.report import StepReport
 from flowborne.coupling.world import World
 from flowborne.kernels.arrays import Array
@@ -35,6 +36,8 @@ class FrameReport:
     controls   (nu,) of the model's actuators, 0 for those that were told nothing
     values     dotted key -> value that differs from the scene's, see [[changes]]
     """
+
+    __repr__ = one_line
 
     frame: int
     time: float
@@ -95,6 +98,8 @@ class Snapshot:
     report  of the last one; None before the first, and after a checkpoint
     kept    what a checkpoint says of bodies and joints
     """
+
+    __repr__ = one_line
 
     world: World
     frame: int

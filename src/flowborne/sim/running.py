@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import signal
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, dataclass
 from enum import Enum
@@ -18,7 +18,7 @@ import numpy as np
 
 from flowborne.base.errors import PartError, SceneError, WorkerError
 from flowborne.base.extras import missing_to_draw
-from flowborne.base.progress import RunProgress, Stage
+from flowborne.base.progress import Progress, RunProgress, Stage, displayed
 from flowborne.kernels.jit import compilation_watched
 from flowborne.runs.checkpoint import load_checkpoint, save_checkpoint, state_bytes
 from flowborne.runs.history import History
@@ -28,14 +28,17 @@ from flowborne.runs.states import check_states
 from flowborne.runs.strained import strained
 from flowborne.runs.summary import doubts_of, peak_memory, summarise, versions
 from flowborne.scenes.bodies import driven_dofs
+from flowborne.scenes.control import objective_unit
 from flowborne.scenes.creature import creature_of
 from flowborne.scenes.earlier import earlier_joints
 from flowborne.scenes.notes import notes_of
 from flowborne.scenes.save import scene_to_resume, with_frames, write_scene
 from flowborne.scenes.seen import seen_bodies
-from flowborne.scenes.warn import warnings_of
+from flowborne.scenes.warn import accepted_of, warnings_of
 from flowborne.sim.frame import PARTS, FrameReport, Snapshot
 from flowborne.sim.simulation import BlowUpError, Simulation
+from flowborne.view.embedded import run_html
+from flowborne.view.open_run import OpenRun
 
 if TYPE_CHECKING:
     from flowborne.scenes.schema import Scene
@@ -77,6 +80,16 @@ class RunResult:
     frames: int
     summary: dict[str, Any]
 
+    def __repr__(self) -> str:
+        return f"RunResult in {self.folder}: {self.outcome.value}, {self.frames} frames"
+
+    def _repr_html_(self) -> str:
+        return run_html(repr(self), self.folder)
+
+    def open(self) -> OpenRun:
+        """The run, to read, plot and view it."""
+        return OpenRun(self.folder)
+
 
 class RunInterrupted(KeyboardInterrupt):
     """The run was interrupted; everything up to its last whole frame is saved.
@@ -98,7 +111,7 @@ def run(
     resume: bool = False,
     replace: bool = False,
     film: bool = True,
-    progress: Callable[[RunProgress], None] | None = None,
+    progress: Progress | bool | None = None,
 ) -> RunResult:
     """Run a scene and write the files listed in `flowborne.runs.run_folder`.
 
@@ -109,7 +122,7 @@ def run(
     resume    continue the run in `out` from its checkpoint
     replace   replace an earlier run in `out`
     film      draw preview.png and preview.mp4 at the end
-    progress  called with the progress of the run
+    progress  called with the progress of the run; True shows it as the command line does
     returns   the result, also of a run that blew up or filled the disc: see its outcome
     raises    RunFolderError if `out` or the arguments are wrong or another run is being written
               there, SceneError if the scene is wrong or does not fit into memory; nothing is then
@@ -133,11 +146,12 @@ def run(
         folder.check_new(replace=replace)
     wanted = with_frames(wanted, frames)
     with folder.locked(), _Signals() as signals, ExitStack() as open_until_the_end:
+        show = open_until_the_end.enter_context(displayed(progress))
         try:
             with signals.interruptible():
                 files = scene_files(wanted)
                 simulation = open_until_the_end.enter_context(Simulation(wanted, workers=workers))
-                job = _Run(simulation, folder, files, signals, progress)
+                job = _Run(simulation, folder, files, signals, show)
                 if wanted.has_fluid:
                     open_until_the_end.enter_context(
                         compilation_watched(lambda kernels: job.show("compiling", kernels=kernels))
@@ -162,7 +176,7 @@ class _Run:
         folder: RunFolder,
         files: dict[str, bytes],
         signals: _Signals,
-        progress: Callable[[RunProgress], None] | None,
+        progress: Progress | None,
     ) -> None:
         self.simulation = simulation
         self.folder = folder
@@ -170,6 +184,8 @@ class _Run:
         self.frames = simulation.frames
         self.taken = earlier_joints(simulation.scene)  # the run may take the earlier one's place
         self.warnings = warnings_of(simulation.scene, simulation.setup)
+        scene, model = simulation.scene, simulation.setup.solid
+        self.unit = objective_unit(scene.objectives, scene.controlled_joints(), model)
         self.columns = (*simulation.columns.names, *(f"seconds_{p}" for p in ("total", *PARTS)))
         self.recorder = Recorder(folder)
         self.history: History | None = None
@@ -237,7 +253,7 @@ class _Run:
             except OSError as error:
                 return RunOutcome.NOT_WRITTEN, self._not_written(error)
             joints = tuple((c, values[c]) for c in simulation.columns.controlled)
-            self.show("frame", objective=report.objective, joints=joints)
+            self.show("frame", objective=report.objective, unit=self.unit, joints=joints)
         try:
             self._save()
         except OSError as error:
@@ -366,10 +382,11 @@ class _Run:
             "message": message,
             "doubts": self._doubts(),
             **summarise(self.folder.history, strength, every),
+            "objective_unit": self.unit,
             "cells": cells,
             "creature": None if creature is None else asdict(creature),
             "warnings": self.warnings,
-            "notes": list(notes_of(scene, world.setup.solid)),
+            "notes": [*notes_of(scene, world.setup.solid), *accepted_of(scene, world.setup)],
             "bodies_as_seen": [asdict(seen) for seen in seen_bodies(world.setup)],
             "state_bytes": state_bytes(world),
             "bytes_per_cell": None if cells is None else state_bytes(world) / cells,

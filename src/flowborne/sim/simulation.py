@@ -137,6 +137,13 @@ class Simulation:
         self._started = False
         self._step: Step = step
 
+    def __repr__(self) -> str:
+        fluid = self.setup.fluid
+        return (
+            f"Simulation '{self.scene.name}': frame {self.frame} of {self.frames}, t = "
+            f"{self._moment.world.time:.4g} s, {'no fluid' if fluid is None else fluid.grid}"
+        )
+
     @property
     def world(self) -> World:
         """The state after `frame` frames, a new World for each.

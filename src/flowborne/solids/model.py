@@ -11,6 +11,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
+from flowborne.base.one_line import one_line
 from flowborne.kernels.arrays import Array, Integers, Mask
 from flowborne.kernels.triangles import distances_to_mesh
 from flowborne.shapes.own import PlacedShape
@@ -44,6 +45,8 @@ class SolidState:
     v    (nv,) MuJoCo's qvel: m/s, rad/s
     act  (na,) activations of muscles and other actuators that have some
     """
+
+    __repr__ = one_line
 
     q: Array
     v: Array
@@ -269,6 +272,9 @@ class SolidModel:
     def actuator(self, name: str) -> int:
         """Number of an actuator. Raises ValueError for an unknown name."""
         return _number(self._actuators, name, "actuator")
+
+    def __repr__(self) -> str:
+        return f"SolidModel(bodies={self.nbody - 1}, joints={len(self.joint_names)})"
 
     def body(self, name: str) -> int:
         """Number of a body. Raises ValueError for an unknown name."""

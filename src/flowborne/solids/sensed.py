@@ -13,6 +13,7 @@ from functools import cached_property, partial
 
 import numpy as np
 
+from flowborne.base.one_line import one_line
 from flowborne.kernels.arrays import Array
 from flowborne.solids.dynamics import Kinematics, kinematics
 from flowborne.solids.model import SolidModel
@@ -36,6 +37,8 @@ class BodyState:
     added_mass        gives (6,) the part of force and torque with which the fluid resists
                       acceleration, solved for when it is first asked for
     """
+
+    __repr__ = one_line
 
     position: Array
     rotation: Array

@@ -9,6 +9,7 @@ from pathlib import Path
 from urllib.parse import quote
 
 from flowborne.base.atomic import write_text
+from flowborne.base.one_line import one_line
 from flowborne.runs.run_folder import RunFolder, cannot_write
 
 PAGE = "index.html"
@@ -84,6 +85,8 @@ class Batch:
     skipped  names of what is in the folder and is no clip
     clips    those done, in the order of their names
     """
+
+    __repr__ = one_line
 
     scene: str
     joints: tuple[str, ...]

@@ -8,7 +8,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,7 @@ import numpy as np
 from flowborne.base.errors import SceneError, fault_of
 from flowborne.base.extras import missing_to_draw
 from flowborne.base.phrases import listed
-from flowborne.base.progress import RunProgress
+from flowborne.base.progress import Progress, RunProgress, displayed
 from flowborne.motion.human.body import ELBOWS
 from flowborne.runs.history import history_columns, read_history
 from flowborne.runs.run_folder import RunFolder, RunFolderError, make_folder
@@ -48,7 +48,7 @@ def run_clips(
     workers: int | None = None,
     replace: bool = False,
     film: bool = True,
-    progress: Callable[[RunProgress], None] | None = None,
+    progress: Progress | bool | None = None,
 ) -> Batch:
     """Run each BVH clip of a folder in a scene, and write a page with their efforts.
 
@@ -79,15 +79,16 @@ def run_clips(
         raise RunFolderError(f"{page} was not made by flowborne; name another folder with --out")
     make_folder(folder)
     batch = Batch(wanted.name, wanted.controlled_joints(), page, len(names), skipped)
-    job = _Batch(scene, settings, folder, {"workers": workers, "progress": progress}, replace, film)
-    for number, clip in enumerate(names, start=1):
-        job.label = f"clip {number} of {len(names)}: {clip.name}"
-        try:
-            batch.clips.append(job.run(clip))
-        except KeyboardInterrupt as stop:
-            same = "the same command" + " without --replace" * replace
-            raise KeyboardInterrupt(f"stopped in {job.label}; {same} continues there") from stop
-        write_page(batch)
+    with displayed(progress) as show:
+        job = _Batch(scene, settings, folder, {"workers": workers, "progress": show}, replace, film)
+        for number, clip in enumerate(names, start=1):
+            job.label = f"clip {number} of {len(names)}: {clip.name}"
+            try:
+                batch.clips.append(job.run(clip))
+            except KeyboardInterrupt as stop:
+                same = "the same command" + " without --replace" * replace
+                raise KeyboardInterrupt(f"stopped in {job.label}; {same} continues there") from stop
+            write_page(batch)
     return batch
 
 

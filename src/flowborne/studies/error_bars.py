@@ -14,10 +14,10 @@ from scipy.optimize import brentq
 
 from flowborne.base.errors import SceneError
 from flowborne.kernels.arrays import Array
-from flowborne.runs.open_run import OpenRun
 from flowborne.scenes.load import load_scene
 from flowborne.scenes.schema import Scene
 from flowborne.sim.running import RunOutcome, run
+from flowborne.view.open_run import OpenRun
 
 FORMAL_ORDER = 2.0
 """Order of the scheme in grid and step for smooth flows."""

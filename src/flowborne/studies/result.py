@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from flowborne.base.atomic import replaced_whole
 from flowborne.base.errors import SceneError
 from flowborne.base.extras import optional
+from flowborne.base.one_line import one_line
 from flowborne.base.phrases import suggestion
 from flowborne.kernels.arrays import Array, Integers
 from flowborne.runs.history import unit_of
@@ -70,6 +71,8 @@ class StudyResult:
     goals    name of a measure with a goal -> "least" or "most"
     failed   member -> what was wrong with it
     """
+
+    __repr__ = one_line
 
     folder: Path
     columns: dict[str, Column]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -13,7 +13,7 @@ from filelock import FileLock, Timeout
 
 from flowborne.base.atomic import write_text
 from flowborne.base.extras import optional
-from flowborne.base.progress import RunProgress
+from flowborne.base.progress import Progress, RunProgress, displayed
 from flowborne.base.version import __version__
 from flowborne.runs.run_folder import LOCK_NAME, RunFolderError, check_name, make_folder
 from flowborne.scenes.load import load_scene
@@ -98,7 +98,7 @@ def study(
     workers: int | None = None,
     dask: str | None = None,
     retry: bool = False,
-    progress: Callable[[RunProgress], None] | None = None,
+    progress: Progress | bool | None = None,
 ) -> StudyResult:
     """Run a study, or what is missing of it, and write its table and page; see docs/studies.md.
 
@@ -109,7 +109,7 @@ def study(
     dask      address of the scheduler of a Dask cluster; without it processes of this machine are
               started. A script must then guard its start by `if __name__ == "__main__"`
     retry     repeat the runs that failed before
-    progress  called when a run has ended
+    progress  called when a run has ended; True shows it as the command line does
     returns   the table of all runs
     raises    SceneError if the study or its scene is wrong, a package is missing, or the cluster is
               lost; RunFolderError if `out` cannot be written or another process is writing there;
@@ -118,10 +118,10 @@ def study(
     plan = file if isinstance(file, Plan) else Plan.of(file)
     optional("pyarrow", "pyarrow", "study", "tables of studies", "written")
     folder = Path("studies") / plan.study.name if out is None else Path(out)
-    with _locked(folder):
+    with _locked(folder), displayed(progress) as show:
         crew = Workers(workers) if dask is None else DaskWorkers(dask, workers)
         try:
-            return _Job(plan, folder, crew, retry, progress).run()
+            return _Job(plan, folder, crew, retry, show).run()
         finally:
             crew.close()
 
@@ -134,7 +134,7 @@ class _Job:
     folder: Path
     workers: Workers
     retry: bool
-    progress: Callable[[RunProgress], None] | None
+    progress: Progress | None
     finished: set[str] = field(default_factory=set)
     rows: list[Row] = field(default_factory=list)
     began: float = field(default_factory=perf_counter)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 from typing import IO, Any
 
@@ -260,6 +261,29 @@ def plot_courses(strips: dict[str, dict[str, tuple[Array, Array]]], path: Path) 
     _save(figure, path)
 
 
+class Plot(Figure):
+    """A figure that notebooks show."""
+
+    def _repr_png_(self) -> bytes:
+        picture = BytesIO()
+        self.savefig(picture, format="png")
+        return picture.getvalue()
+
+
+def plot_columns(times: Array, columns: dict[str, Array]) -> Plot:
+    """Columns of a history over time, a strip for each.
+
+    times    (n,) s
+    columns  name with its unit -> (n,) values
+    """
+    figure, axes = _figure(len(columns), (7.2, 0.6 + 1.8 * len(columns)), Plot)
+    for strip, (name, values) in zip(axes, columns.items(), strict=True):
+        strip.set_title(name, loc="left", fontsize=9, color=style.MUTED)
+        strip.plot(times, values, lw=1.6, color=style.CURVES[0])
+    axes[-1].set_xlabel("time (s)", fontsize=9, color=style.MUTED)
+    return figure
+
+
 def plot_points(
     x: Array,
     y: Array,
@@ -303,8 +327,10 @@ def plot_points(
             figure.savefig(path, format="svg", metadata={"Date": None})
 
 
-def _figure(rows: int, inches: tuple[float, float]) -> tuple[Figure, list[Axes]]:
-    figure = Figure(figsize=inches, dpi=150, layout="constrained", facecolor=style.PAPER)
+def _figure(
+    rows: int, inches: tuple[float, float], kind: type[Figure] = Figure
+) -> tuple[Any, list[Axes]]:
+    figure = kind(figsize=inches, dpi=150, layout="constrained", facecolor=style.PAPER)
     axes = list(np.ravel(figure.subplots(rows, 1, sharex=True)))
     for strip in axes:
         strip_style(strip)

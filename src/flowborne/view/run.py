@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flowborne.kernels.arrays import Array, Integers
-from flowborne.runs.history import history_columns, read_history
-from flowborne.runs.open_run import OpenRun
+from flowborne.runs.history import HistoryColumns, history_columns, read_history
+from flowborne.runs.open_run import StoredRun
 from flowborne.runs.run_folder import RunFolder, RunFolderError, reading
 from flowborne.shapes.primitives import shape_of
 from flowborne.shapes.shape import Shape
@@ -96,7 +96,7 @@ Skin = Flesh | CarriedSkin
 """A surface that deforms from frame to frame."""
 
 
-class Run(OpenRun):
+class Run(StoredRun):
     """A run opened for drawing; `history` has only the columns that are plotted.
 
     raises  RunFolderError when it is not a run, has no state yet, or a file is missing or damaged
@@ -116,7 +116,7 @@ class Run(OpenRun):
     def __init__(self, folder: str | Path) -> None:
         super().__init__(folder)
         with reading(self.folder):
-            scene, model = self.scene, self._model
+            scene, model = self.tables, self._model
             body_of = dict(zip(self.joints, model.get("joint_bodies", []), strict=False))
             self.controlled: tuple[str, ...] = tuple(model["controlled"])
             self.accented = frozenset(body_of[j] for j in self.controlled if j in body_of)
@@ -195,7 +195,7 @@ def _sources(scene: dict[str, Any]) -> Array:
     return np.array([box for box in boxes if len(box[0]) == 3], float).reshape(-1, 2, 3)
 
 
-def _plotted(path: Path) -> dict[str, Array]:
+def _plotted(path: Path) -> HistoryColumns:
     """The plotted columns that the run has.
 
     raises  ValueError for a history without frames or times

@@ -124,7 +124,7 @@ def run_of(tmp_path: Path) -> Callable[..., Run]:
         plain = np.array([0.5, 0.5, 0.5, 1.0])
         values: dict[str, object] = {
             "name": "made up",
-            "scene": {},
+            "tables": {},
             "bodies": ("world", *(f"body {n}" for n in range(count))),
             "accented": frozenset(accented),
             "controlled": (),
@@ -147,7 +147,7 @@ def run_of(tmp_path: Path) -> Callable[..., Run]:
             "frames": tuple(range(frames)),
         }
         if origins is not None:
-            values["scene"] = {"domain": {"follow": "bodies"}}
+            values["tables"] = {"domain": {"follow": "bodies"}}
         run = Run.__new__(Run)
         vars(run).update(values | options)
         return run

@@ -125,7 +125,7 @@ def test_water_goes_on_where_the_domain_may_go(run: Run, box_of_fluid: Grid) -> 
     low, high = water_of(run)
     assert np.isneginf(low).all()
     assert np.isposinf(high).all()
-    run.scene = {"domain": {"follow": "bodies", "along": ["x"]}}
+    run.tables = {"domain": {"follow": "bodies", "along": ["x"]}}
     low, high = water_of(run)
     assert np.array_equal(low, [-np.inf, *box_of_fluid.origin[1:]])
     assert np.array_equal(high, [np.inf, *box_of_fluid.upper[1:]])
