@@ -394,7 +394,7 @@ def view(
     except ValueError as error:
         raise InputError(str(error)) from error
     print(f"viewing {folder} at http://{host}:{port}; Ctrl-C ends it", flush=True)
-    with suppress(KeyboardInterrupt):
+    with closing(viewer), suppress(KeyboardInterrupt):
         serve(viewer)
 
 

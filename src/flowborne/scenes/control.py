@@ -25,7 +25,7 @@ from flowborne.control.rules import AnyRule, RuleFixed
 from flowborne.control.surroundings import Surroundings
 from flowborne.control.trial import Hypothesis
 from flowborne.scenes.motions import EXACT, ServoTable, out_of_plane
-from flowborne.solids.model import FREE, joint_kind
+from flowborne.solids.model import FREE, SLIDE, SolidModel, joint_kind
 
 MOST_STEPS_PER_DECISION = 1_000_000
 """Hypothetical steps; without a fluid they take a minute, with one hours."""
@@ -187,6 +187,25 @@ def controller_of(
         executor=executor,
         in_phases=tuple(in_phases),
     )
+
+
+UNITS = {"velocity": "m^2/s^2", "speed": "m/s", "distance": "m"} | dict.fromkeys(
+    ("wind-drag", "drag", "pressure-drag", "pressure-lift"), "N"
+)
+"""Kind of an objective -> unit of its value."""
+
+
+def objective_unit(
+    objectives: Sequence[AnyObjective], controlled: Sequence[str], model: SolidModel
+) -> str:
+    """Unit of the weighted sum of objectives of the controlled joints; "" where they have several,
+    or one that is not known."""
+    kinds = {joint_kind(model, joint) == SLIDE for joint in controlled}
+    turning = {"effort": "N m s", "input-motion": "rad^2"} if kinds == {False} else {}
+    sliding = {"effort": "N s", "input-motion": "m^2"} if kinds == {True} else {}
+    known = UNITS | turning | sliding
+    units = {known.get(table.kind, "") for table in objectives if table.weight}
+    return units.pop() if len(units) == 1 else ""
 
 
 def check_control(

@@ -174,7 +174,7 @@ def test_a_walker_that_is_played_leans_the_other_way(browser: Any, tmp_path: Pat
         print(page.get_by_text("frames a second").inner_text())
         page.get_by_role("button", name="pause").click()
         page.get_by_text("paused").wait_for()
-        page.get_by_role("button", name="record").click()
+        page.get_by_role("button", name="save as a run").click()
         page.get_by_text("they repeat what was played, bit for bit").wait_for(timeout=60_000)
         page.screenshot(path=shots / "play-2.png")
         page.close()
