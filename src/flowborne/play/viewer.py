@@ -9,7 +9,7 @@ from pathlib import Path
 from queue import Empty, SimpleQueue
 from threading import Event, Thread
 from time import monotonic
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -22,14 +22,12 @@ from flowborne.play.playing import Moment, Play
 from flowborne.runs.run_folder import RunFolder, RunFolderError
 from flowborne.scenes.schema import Scene
 from flowborne.sim.simulation import BlowUpError
+from flowborne.view.browser.gate import Gate
 from flowborne.view.browser.settings import Settings
 from flowborne.view.browser.solids import Bodies
 from flowborne.view.browser.surroundings import show_wind
 from flowborne.view.browser.viewer import RunView, start_server
 from flowborne.view.run import State
-
-if TYPE_CHECKING:
-    from viser import ViserServer
 
 RATED = 2.0
 """s over which frames a second are counted."""
@@ -57,7 +55,7 @@ class PlayViewer(RunView):
     image_side = 384
     margin = 1.3
 
-    def __init__(self, server: ViserServer, play: Play, run: PlayedRun, out: Path) -> None:
+    def __init__(self, gate: Gate, play: Play, run: PlayedRun, out: Path) -> None:
         """`out`: folder to record to; a number is appended if it exists."""
         self.running = True
         self._play, self._out = play, out
@@ -70,7 +68,7 @@ class PlayViewer(RunView):
         self._record_asked, self._steps, self._due = False, 0, 0.0
         self._done: deque[float] = deque()
         self._message = ""
-        super().__init__(server, run, str(out))
+        super().__init__(gate, run, str(out))
 
     def tick(self, seconds: float) -> None:
         self._collect()
@@ -306,13 +304,13 @@ def open_play(
     out     folder to record to; a number is appended if it exists
     raises  SceneError if the scene is wrong, viser is missing, or host and port cannot be used
     """
-    server = start_server(host, port)
+    gate = start_server(host, port)
     play = None
     try:
         play = Play(scene, workers)
-        return PlayViewer(server, play, PlayedRun(play), out)
+        return PlayViewer(gate, play, PlayedRun(play), out)
     except BaseException:
-        server.stop()
+        gate.stop()
         if play is not None:
             play.close()
         raise

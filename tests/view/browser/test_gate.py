@@ -7,7 +7,7 @@ import socket
 from collections.abc import Callable, Iterator
 from dataclasses import fields
 from pathlib import Path
-from time import sleep
+from time import monotonic, sleep
 from typing import Any
 
 import pytest
@@ -97,7 +97,7 @@ def test_a_wrong_camera_is_dropped(viewer: Viewer, wrong: dict[str, Any]) -> Non
 
 def gate_of(viewer: Viewer) -> Callable[[bytes | str], bool]:
     gate = Gate()
-    gate.gui = viewer.server.gui
+    gate.server = viewer.server
     return gate.accepts
 
 
@@ -212,3 +212,13 @@ def test_a_camera_at_the_edge_of_what_is_taken_has_keys(viewer: Viewer) -> None:
 
             until(stands)
             viewer.look()
+
+
+def test_a_connection_that_says_nothing_does_not_keep_the_server(viewer: Viewer) -> None:
+    """Browsers open some in advance."""
+    with socket.create_connection(("127.0.0.1", viewer.server.get_port())) as line:
+        line.sendall(b"GET / HT")
+        sleep(0.2)
+        began = monotonic()
+        viewer.close()
+        assert monotonic() - began < 0.9

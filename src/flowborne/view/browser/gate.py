@@ -9,16 +9,17 @@ import http
 import logging
 import socket
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout, suppress
 from dataclasses import fields
 from functools import wraps
+from io import StringIO
 from ipaddress import ip_address
 from math import dist, hypot, isfinite, pi
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
 if TYPE_CHECKING:
-    from viser import GuiApi
+    from viser import ViserServer
 
 LONGEST = 2**16
 """Length of the longest message, bytes: those of a page have less than a thousand."""
@@ -35,12 +36,30 @@ SILENT.setLevel(logging.CRITICAL + 1)
 
 
 class Gate:
-    """Check of all that reaches a server.
+    """A server, and the check of all that reaches it.
 
-    gui  with the controls that a page may set; None until the server has one
+    server   of viser, with the controls that a page may set; set as soon as there is one
+    serving  of websockets
     """
 
-    gui: GuiApi | None = None
+    server: ViserServer
+    serving: Any
+
+    def stop(self) -> None:
+        """Stop the server at once, and quietly.
+
+        Connections are cut: one that has not asked for anything yet, such as browsers open in
+        advance, would keep it for seconds.
+        """
+
+        def cut() -> None:
+            for connection in list(self.serving.server.handlers):
+                connection.transport.abort()
+
+        with suppress(RuntimeError):  # it has been stopped before
+            self.server.get_event_loop().call_soon_threadsafe(cut)
+        with redirect_stdout(StringIO()):  # viser prints that it has stopped
+            self.server.stop()
 
     def accepts(self, message: Any) -> bool:
         """Whether a message is one that our page sends: a camera, a control or a key.
@@ -60,7 +79,7 @@ class Gate:
             kind, accepts = kinds[found.pop("type")]
             known = {field.name for field in fields(kind)}
             return known == found.keys() and accepts(msgspec.convert(found, kind))
-        except (KeyError, TypeError, ValueError, RecursionError):
+        except (AttributeError, KeyError, TypeError, ValueError, RecursionError):
             return False
 
     def _accepts_camera(self, camera: Any) -> bool:
@@ -75,7 +94,7 @@ class Gate:
 
     def _accepts_value(self, update: Any) -> bool:
         """Whether the update is of the value only, and one that its control can have."""
-        handle: Any = self.gui and self.gui._gui_input_handle_from_uuid.get(update.uuid)
+        handle: Any = self.server.gui._gui_input_handle_from_uuid.get(update.uuid)
         if handle is None or update.updates.keys() != {"value"}:
             return False
         value = update.updates["value"]
@@ -156,8 +175,9 @@ def guarded(served: str) -> Iterator[Gate]:
             connection.recv = accepted
             await handler(connection)
 
-        options |= {"max_size": LONGEST, "close_timeout": 1.0, "logger": SILENT}
-        return serve(handle, *args, process_request=checked, **options)
+        options |= {"max_size": LONGEST, "logger": SILENT}
+        gate.serving = serve(handle, *args, process_request=checked, **options)
+        return gate.serving
 
     vars(server)["serve"] = checked_serve  # viser does not pass options on
     try:

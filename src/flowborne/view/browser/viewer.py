@@ -20,7 +20,7 @@ from flowborne.runs.run_folder import RunFolder, RunFolderError, reading
 from flowborne.runs.states import read_state
 from flowborne.view import style
 from flowborne.view.browser.fluid import MIN_IMAGE_SIDE, Fluid
-from flowborne.view.browser.gate import guarded
+from flowborne.view.browser.gate import Gate, guarded
 from flowborne.view.browser.page import style_page
 from flowborne.view.browser.panel import Panel, legend_html
 from flowborne.view.browser.settings import Settings, Timeline
@@ -31,7 +31,7 @@ from flowborne.view.framing import window_path
 from flowborne.view.run import Run, State
 
 if TYPE_CHECKING:
-    from viser import ClientHandle, ViserServer
+    from viser import ClientHandle
 
 
 class GrowingRun(Run):
@@ -91,15 +91,15 @@ class RunView:
     image_side = MIN_IMAGE_SIDE
     margin = 1.05
 
-    def __init__(self, server: ViserServer, run: Run, folder: str) -> None:
+    def __init__(self, gate: Gate, run: Run, folder: str) -> None:
         """`folder`: of the run, for commands.
 
         raises  ValueError if the shot of the run's scene does not fit it
         """
-        self.server, self.folder = server, folder
+        self._gate, self.server, self.folder = gate, gate.server, folder
         self._shown: tuple[Any, ...] | None = None
         self._open(run)
-        server.on_client_connect(self._show_home)
+        self.server.on_client_connect(self._show_home)
 
     def tick(self, seconds: float) -> None:
         """Advance by seconds of real time, and update the scene if anything changed."""
@@ -121,8 +121,7 @@ class RunView:
 
     def close(self) -> None:
         """Stop the server; its pages say so."""
-        with redirect_stdout(StringIO()):  # viser prints that it has stopped
-            self.server.stop()
+        self._gate.stop()
 
     def _open(self, run: Run) -> None:
         """Show another run from its beginning."""
@@ -249,15 +248,14 @@ def open_viewer(folder: Path, host: str, port: int) -> Viewer:
     return Viewer(start_server(host, port), run, str(folder))
 
 
-def start_server(host: str, port: int) -> ViserServer:
-    """A server of a page. Raises SceneError as `open_viewer` does."""
+def start_server(host: str, port: int) -> Gate:
+    """A server of a page, behind its gate. Raises SceneError as `open_viewer` does."""
     viser = optional("viser", "viser", "view", "views in a browser")
     _check_free(host, port)
     # viser prints a frame with its addresses, which our own line has
     with guarded(host) as gate, redirect_stdout(StringIO()):
-        server: ViserServer = viser.ViserServer(host=host, port=port, verbose=False)
-    gate.gui = server.gui
-    return server
+        gate.server = viser.ViserServer(host=host, port=port, verbose=False)
+    return gate
 
 
 def serve(viewer: RunView) -> None:
