@@ -14,7 +14,7 @@ from dataclasses import fields
 from functools import wraps
 from io import StringIO
 from ipaddress import ip_address
-from math import dist, hypot, isfinite, pi
+from math import dist, hypot, pi
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
@@ -29,6 +29,9 @@ FARTHEST = 1e9
 
 NEAREST = 1e-9
 """Smallest distance of a camera from its target, m, and smallest length of a direction."""
+
+ROUNDING = 1e-6
+"""Error by which a page rounds the number of a slider, also that of its end."""
 
 SILENT = logging.getLogger("flowborne.page")
 """Logger of the connections: what goes wrong in one of them is the client's."""
@@ -102,7 +105,7 @@ class Gate:
             return value in handle.options
         if hasattr(handle, "min"):
             number = isinstance(value, int | float) and not isinstance(value, bool)
-            return number and isfinite(value) and handle.min <= value <= handle.max
+            return number and handle.min - ROUNDING <= value <= handle.max + ROUNDING
         return isinstance(value, bool)
 
 
