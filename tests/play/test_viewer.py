@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import shlex
 import socket
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from time import monotonic
+from time import monotonic, sleep
+from typing import Any
+from xml.sax.saxutils import quoteattr
 
 import numpy as np
 import pytest
@@ -111,7 +114,7 @@ def test_goes_on_from_an_earlier_frame(viewer: PlayViewer) -> None:
 def test_records_into_a_new_folder(viewer: PlayViewer, tmp_path: Path) -> None:
     stepped(viewer, 2)
     for name in ("out", "out-2"):
-        viewer.panel.asked.put("record")
+        viewer.panel.asked.put("save as a run")
         until(viewer, lambda name=name: f"{name}; they repeat" in viewer.panel._said.content)
         assert len(fb.open_run(tmp_path / name)) == 3
     assert free_folder(tmp_path / "out") == tmp_path / "out-3"
@@ -152,3 +155,70 @@ def test_a_scene_that_does_not_exist_is_said(capsys: pytest.CaptureFixture[str])
     assert left.value.code == 2
     (line,) = capsys.readouterr().err.strip().splitlines()
     assert "did you mean 'human-wind-back'?" in line
+
+
+def test_ending_while_a_run_is_saved_says_how_far_it_is(
+    viewer: PlayViewer, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    stepped(viewer, 30)
+    viewer.panel.asked.put("save as a run")
+    until(viewer, lambda: "saving frame" in viewer.panel._said.content)
+    with pytest.raises(KeyboardInterrupt, match=r"recording stopped at frame \d+ of 30") as ended:
+        viewer.close()
+    assert capfd.readouterr() == ("", "")
+    command = shlex.split(str(ended.value).partition("continue with: flowborne ")[2])
+    with pytest.raises(SystemExit, match="0"):
+        main([*command, "--no-film"])
+    assert len(fb.open_run(tmp_path / "out")) == 31
+
+
+def test_a_frame_that_takes_minutes_does_not_keep_the_viewer(
+    viewer: PlayViewer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(viewer._play.simulation, "advance_frame", lambda: sleep(60.0))
+    viewer.panel.asked.put("run")
+    until(viewer, lambda: viewer._job is not None)
+    began = monotonic()
+    viewer.close()
+    assert monotonic() - began < 3.0
+
+
+def test_one_button_runs_and_pauses(viewer: PlayViewer) -> None:
+    for running, label in ((False, "run"), (True, "pause"), (False, "run")):
+        viewer.running = running
+        viewer.tick(0.0)
+        assert viewer.panel._buttons.options == ("◀", label, "▶", "newest")
+
+
+def test_plots_show_the_last_ten_seconds_with_goal_and_unit(viewer: PlayViewer) -> None:
+    stepped(viewer, 260)
+    viewer.look()
+    curves = viewer.panel.curves
+    times = curves.plots[-1].data[0]
+    assert times[-1] == pytest.approx(260 / 24)
+    assert times[0] == pytest.approx(times[-1] - 10.0, abs=0.05)
+    assert curves._titles[0][0] == "objective: least wind-drag (N)"
+
+
+def test_names_and_messages_are_no_html(tmp_path: Path, small_scene: Path) -> None:
+    evil = '<img src=x onerror="alert(1)">'
+    model = small_scene.with_name("block.xml")
+    model.write_text(model.read_text().replace('name="hinge"', f"name={quoteattr(evil)}"))
+    text = small_scene.read_text().replace("{ hinge =", f"{{ '{evil}' =")
+    small_scene.write_text(text.replace('"hinge"', f"'{evil}'"))
+    scene, out = fb.load_scene(small_scene), tmp_path / evil
+    opened = open_play(scene, out, host="127.0.0.1", port=free_port(), workers=1)
+    opened.running = False
+    stepped(opened, 2)
+    opened.panel.asked.put("save as a run")
+    until(opened, lambda: "they repeat" in opened.panel._said.content)
+    opened.look()
+    shown = [getattr(handle, "content", "") for handle in contents(opened.server.gui)]
+    assert any("&lt;img" in content for content in shown)
+    assert not any("<img" in content for content in shown)
+    opened.close()
+
+
+def contents(gui: Any) -> list[Any]:
+    """Handles of all that is in a panel."""
+    return [h for held in gui._container_handle_from_uuid.values() for h in held._children.values()]

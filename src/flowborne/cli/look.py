@@ -37,7 +37,7 @@ def view(folder: FolderArgument, port: PortOption = 8080, host: HostOption = "12
     except ValueError as error:
         raise InputError(str(error)) from error
     print(f"viewing {folder} at http://{host}:{port}; Ctrl-C ends it", flush=True)
-    with suppress(KeyboardInterrupt):
+    with closing(viewer), suppress(KeyboardInterrupt):
         serve(viewer)
 
 

@@ -11,6 +11,7 @@ from flowborne.kernels.arrays import Array
 from flowborne.play.playing import Moment, Play
 from flowborne.runs.history import HistoryColumns
 from flowborne.runs.run_folder import RunFolder
+from flowborne.scenes.control import objective_unit
 from flowborne.sim.running import write_state_alone
 from flowborne.view.run import Run, State
 
@@ -33,6 +34,8 @@ class PlayedRun(Run):
             path = Path(folder) / play.simulation.scene.name
             write_state_alone(RunFolder(path), play.simulation)
             super().__init__(path)
+        scene, model = play.simulation.scene, play.simulation.setup.solid
+        self.objective_unit = objective_unit(scene.objectives, scene.controlled_joints(), model)
         self.moments = [first]
         self._bytes, self._most = first.bytes, most
         self._index(np.array([first.row["time_s"]]))

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from html import escape
 from queue import SimpleQueue
 from typing import TYPE_CHECKING, Any
 
 from flowborne.play.controls import Controls, Settings
 from flowborne.play.memory import PlayedRun
-from flowborne.view.browser.panel import Panel
+from flowborne.view.browser.panel import Home, Panel
 from flowborne.view.browser.settings import Timeline
 from flowborne.view.browser.viewpoint import FilmView
 from flowborne.view.run import Run
@@ -15,8 +16,8 @@ from flowborne.view.run import Run
 if TYPE_CHECKING:
     from viser import GuiApi
 
-BUTTONS = ("◀", "run", "pause", "▶", "newest")
-"""What the buttons ask for, as they are labelled."""
+RUN, PAUSE = "run", "pause"
+"""The label of one button: what it does next."""
 
 KEYS: tuple[tuple[str, Any, str], ...] = (
     ("frame before", "arrowleft", "◀"),
@@ -26,11 +27,20 @@ KEYS: tuple[tuple[str, Any, str], ...] = (
 )
 """Name, key and request of each key."""
 
-RECORD = "record"
+SAVE = "save as a run"
+SAID = '<div style="padding:2px 12px 8px;font-size:14px;white-space:pre-wrap">{}</div>'
+LAST_SECONDS = 10.0
+"""Seconds that the plots show."""
+
 GHOSTS = ("none", "in place", "beside")
 
 EXPANDED = 4
 """Number of folders of settings up to which all are open at the start; else the first one is."""
+
+
+def _buttons(toggle: str) -> tuple[str, ...]:
+    """Labels of the buttons, which are what they ask for."""
+    return ("◀", toggle, "▶", "newest")
 
 
 class PlayPanel(Panel):
@@ -39,14 +49,22 @@ class PlayPanel(Panel):
     asked  what buttons and keys asked for
     """
 
+    seconds = LAST_SECONDS
+
     def __init__(
-        self, gui: GuiApi, run: PlayedRun, view: FilmView, timeline: Timeline, controls: Controls
+        self,
+        gui: GuiApi,
+        run: PlayedRun,
+        view: FilmView,
+        timeline: Timeline,
+        controls: Controls,
+        home: Home,
     ) -> None:
         self.asked: SimpleQueue[str] = SimpleQueue()
         self._has_ghost = run.moments[0].ghost is not None
         self._controls_of_play = controls
         self._dials: dict[str, Any] = {}
-        super().__init__(gui, run, view, timeline)
+        super().__init__(gui, run, view, timeline, home)
 
     @property
     def dials(self) -> dict[str, float | str]:
@@ -63,9 +81,16 @@ class PlayPanel(Panel):
                 self._dials[name].value = value
 
     def say(self, text: str) -> None:
-        """Show a text below the buttons; Markdown."""
-        if text != self._said.content:
-            self._said.content = text
+        """Show a text below the buttons."""
+        content = SAID.format(escape(text))
+        if content != self._said.content:
+            self._said.content = content
+
+    def show_running(self, running: bool) -> None:
+        """Let the button say what it does next."""
+        options = _buttons(PAUSE if running else RUN)
+        if options != self._buttons.options:
+            self._buttons.options = options
 
     def extend_time(self) -> None:
         """Let the slider reach over the frames now."""
@@ -82,13 +107,13 @@ class PlayPanel(Panel):
         first = float(self._timeline.times[0])
         self._slider = gui.add_slider("time (s)", first, first + 1.0, 1e-4, first)
         self._slider_time = self._slider.value
-        buttons = gui.add_button_group("", list(BUTTONS))
-        buttons.on_click(lambda event: self.asked.put(event.target.value))
+        self._buttons = gui.add_button_group("", _buttons(RUN))
+        self._buttons.on_click(lambda event: self.asked.put(event.target.value))
         for name, key, request in KEYS:
             self._ask_by(gui.add_command(name, hotkey=key), request)
-        self._said = gui.add_markdown("")
+        self._said = gui.add_html("")
         self._add_dials(gui)
-        gui.add_button(RECORD).on_click(lambda _: self.asked.put(RECORD))
+        gui.add_button(SAVE).on_click(lambda _: self.asked.put(SAVE))
 
     def _ask_by(self, command: Any, request: str) -> None:
         command.on_trigger(lambda _: self.asked.put(request))

@@ -120,7 +120,7 @@ class Play:
         raises  RunFolderError if the folder cannot be written, or nothing was played
         """
         if until.frame == 0:
-            raise RunFolderError("nothing has been played yet; run some frames, then record")
+            raise RunFolderError("nothing has been played yet; run some frames, then save")
         scene = self.simulation.scene.model_copy(update={"changes": until.changes})
         result = run(with_frames(scene, until.frame), folder, film=False, progress=progress)
         if result.outcome not in (RunOutcome.DONE, RunOutcome.DOUBTFUL):

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor, wait
-from dataclasses import replace
-from html import escape
+from concurrent.futures import Future, wait
 from pathlib import Path
-from queue import Empty
+from queue import Empty, SimpleQueue
+from threading import Event, Thread
 from time import monotonic
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -18,20 +17,17 @@ from flowborne.base.errors import SceneError
 from flowborne.base.progress import RunProgress
 from flowborne.kernels.arrays import Array
 from flowborne.play.memory import PlayedRun
-from flowborne.play.panel import RECORD, PlayPanel
+from flowborne.play.panel import SAVE, PlayPanel
 from flowborne.play.playing import Moment, Play
-from flowborne.runs.run_folder import RunFolderError
+from flowborne.runs.run_folder import RunFolder, RunFolderError
 from flowborne.scenes.schema import Scene
 from flowborne.sim.simulation import BlowUpError
+from flowborne.view.browser.gate import Gate
 from flowborne.view.browser.settings import Settings
 from flowborne.view.browser.solids import Bodies
 from flowborne.view.browser.surroundings import show_wind
 from flowborne.view.browser.viewer import RunView, start_server
-from flowborne.view.browser.viewpoint import FilmView
-from flowborne.view.run import Run, State
-
-if TYPE_CHECKING:
-    from viser import ViserServer
+from flowborne.view.run import State
 
 RATED = 2.0
 """s over which frames a second are counted."""
@@ -39,10 +35,10 @@ RATED = 2.0
 FOLLOWED = 1.0
 """s of the path of the bodies from which the place of a camera that follows them is taken."""
 
-MARGIN = 1.3
-"""Distance of the first camera, in that of a film of the first frame."""
-
 GHOST_OPACITY = 0.35
+
+PATIENCE = 0.5
+"""s that a frame in progress has when the viewer closes; what is played is not kept anyway."""
 
 ASIDE = 0.45
 """Distance of the ghost beside the bodies, in smaller sides of the view."""
@@ -57,18 +53,22 @@ class PlayViewer(RunView):
     run: PlayedRun
     panel: PlayPanel
     image_side = 384
+    margin = 1.3
 
-    def __init__(self, server: ViserServer, play: Play, run: PlayedRun, out: Path) -> None:
+    def __init__(self, gate: Gate, play: Play, run: PlayedRun, out: Path) -> None:
         """`out`: folder to record to; a number is appended if it exists."""
         self.running = True
         self._play, self._out = play, out
-        self._thread = ThreadPoolExecutor(1, "play")
+        self._jobs: SimpleQueue[Callable[[], None] | None] = SimpleQueue()
+        # a daemon, so that a frame of minutes does not keep the process
+        Thread(target=lambda: [job() for job in iter(self._jobs.get, None)], daemon=True).start()
+        self._closed, self._saved = Event(), ""
         self._job: Future[Any] | None = None
         self._take: Callable[[Any], None] = self._add
         self._record_asked, self._steps, self._due = False, 0, 0.0
         self._done: deque[float] = deque()
         self._message = ""
-        super().__init__(server, run, str(out))
+        super().__init__(gate, run, str(out))
 
     def tick(self, seconds: float) -> None:
         self._collect()
@@ -82,6 +82,7 @@ class PlayViewer(RunView):
         self._submit()
         super().tick(seconds)
         self.panel.say(self._status())
+        self.panel.show_running(self.running)
 
     def look(self) -> None:
         self.run.update_history()
@@ -96,16 +97,19 @@ class PlayViewer(RunView):
             wait([self._job], timeout=seconds)
 
     def close(self) -> None:
-        """Stop the simulation after its present frame, and the server."""
-        self._thread.shutdown(cancel_futures=True)
-        self._play.close()
-        self.server.stop()
+        """Stop server and simulation at once; a recording is stopped after its present frame.
 
-    def _first_view(self, run: Run) -> FilmView:
-        view = FilmView.of(run)
-        first = view.first
-        away = MARGIN * (first.position - first.target)
-        return replace(view, first=replace(first, position=first.target + away))
+        raises  KeyboardInterrupt if there was one: says where it is, and how to continue
+        """
+        self._closed.set()
+        self._jobs.put(None)
+        super().close()
+        if self._job is not None:
+            wait([self._job], timeout=None if self._take == self._say else PATIENCE)
+        self._play.close()
+        if self._saved:
+            said, self._saved = self._saved, ""
+            raise KeyboardInterrupt(said)
 
     def _new_panel(self) -> PlayPanel:
         self._path = [np.zeros(3)]
@@ -118,7 +122,8 @@ class PlayViewer(RunView):
             self._ghost_frame = self.server.scene.add_frame("/run/ghost", show_axes=False)
             self._ghost = Bodies(self.server.scene, self.run, side, "ghost", GHOST_OPACITY)
         self.timeline.show_newest()
-        return PlayPanel(self.server.gui, self.run, self._view, self.timeline, self._play.controls)
+        controls, home = self._play.controls, self._show_home
+        return PlayPanel(self.server.gui, self.run, self._view, self.timeline, controls, home)
 
     def _read_requests(self) -> None:
         timeline = self.timeline
@@ -129,14 +134,15 @@ class PlayViewer(RunView):
                 return
             if request == "run or pause":
                 request = "pause" if self.running else "run"
-            if request == RECORD:
+            if request == SAVE:
                 self._record_asked = True
                 continue
             before = timeline.number
             self.running, self._message = request == "run", ""
-            if request == "▶" and before == len(self.run) - 1:
-                self._steps += 1
-            elif request in ("◀", "▶"):
+            self._steps = self._steps + 1 if request == "▶" and before == len(self.run) - 1 else 0
+            if self._steps:
+                continue
+            if request in ("◀", "▶"):
                 timeline.step(-1 if request == "◀" else 1)
             elif request == "newest":
                 timeline.show_newest()
@@ -150,8 +156,7 @@ class PlayViewer(RunView):
             return
         if self._record_asked:
             self._record_asked = False
-            self._take = self._say
-            self._job = self._thread.submit(self._record, self.run.moments[-1])
+            self._begin(self._say, self._record, self.run.moments[-1])
         elif (self.running and now >= self._due) or self._steps > 0:
             self._steps = max(0, self._steps - 1)
             frame_time = 1.0 / self.run.frames_per_second
@@ -159,9 +164,20 @@ class PlayViewer(RunView):
             if self.timeline.number < len(self.run) - 1:
                 self._cut(self.timeline.number + 1)
             self.timeline.show_newest()
-            self._take = self._add
-            last, dials = self.run.moments[-1], self.panel.dials
-            self._job = self._thread.submit(self._play.advance, last, dials)
+            self._begin(self._add, self._play.advance, self.run.moments[-1], self.panel.dials)
+
+    def _begin(self, take: Callable[[Any], None], work: Callable[..., Any], *given: Any) -> None:
+        """Let the thread of the simulation do some work, and take its result."""
+        job: Future[Any] = Future()
+        self._take, self._job = take, job
+
+        def do() -> None:
+            try:
+                job.set_result(work(*given))
+            except BaseException as error:
+                job.set_exception(error)
+
+        self._jobs.put(do)
 
     def _collect(self) -> None:
         if self._job is None or not self._job.done():
@@ -196,11 +212,20 @@ class PlayViewer(RunView):
         self._shown = None
 
     def _record(self, until: Moment) -> str:
-        def show(news: RunProgress) -> None:
-            self._message = f"recording frame {news.frame} of {news.frames}"
+        out = free_folder(self._out)
+        scene = RunFolder(out).scene
 
-        self._message = "recording"
-        return self._play.record(until, free_folder(self._out), show)
+        def show(news: RunProgress) -> None:
+            self._message = f"saving frame {news.frame} of {news.frames}"
+            if self._closed.is_set():
+                self._saved = (
+                    f"recording stopped at frame {news.frame} of {news.frames}; "
+                    f"continue with: flowborne run {scene} --out {out} --resume"
+                )
+                raise KeyboardInterrupt
+
+        self._message = "saving"
+        return self._play.record(until, out, show)
 
     def _say(self, text: str) -> None:
         self._message = text
@@ -219,7 +244,7 @@ class PlayViewer(RunView):
         if later and not self.running:
             frames = "frame" if later == 1 else f"{later} frames"
             said += f"; run drops the {frames} after this one"
-        return said + (f"\n\n{escape(self._message, quote=False)}" if self._message else "")
+        return f"{said}\n{self._message}".rstrip()
 
     def _middle(self, moment: Moment) -> Array:
         """(3,) mean position of the bodies' geometries, m."""
@@ -279,13 +304,13 @@ def open_play(
     out     folder to record to; a number is appended if it exists
     raises  SceneError if the scene is wrong, viser is missing, or host and port cannot be used
     """
-    server = start_server(host, port)
+    gate = start_server(host, port)
     play = None
     try:
         play = Play(scene, workers)
-        return PlayViewer(server, play, PlayedRun(play), out)
+        return PlayViewer(gate, play, PlayedRun(play), out)
     except BaseException:
-        server.stop()
+        gate.stop()
         if play is not None:
             play.close()
         raise

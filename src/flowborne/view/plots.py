@@ -50,6 +50,15 @@ def joint_curves(run: Run) -> tuple[str, dict[str, Array]]:
     return "", {}
 
 
+def objective_title(run: Run) -> str:
+    """Title of the plot of the objective: its goal, its kind and its unit, if they are known."""
+    tables = [table for table in run.scene.get("objectives", ()) if table.get("weight", 1.0) != 0.0]
+    title = "objective"
+    if len(tables) == 1:
+        title += f": {tables[0].get('goal', 'least')} {tables[0]['kind']}"
+    return f"{title} ({run.objective_unit})" if run.objective_unit else title
+
+
 def strip_curves(run: Run) -> list[tuple[str, dict[str, Array]]]:
     """(title, name -> values) of every strip of a run.
 
@@ -60,8 +69,7 @@ def strip_curves(run: Run) -> list[tuple[str, dict[str, Array]]]:
     terms = [column for column in run.history if column.startswith("measured_")]
     objective = run.history.get("objective")
     if objective is not None and np.isfinite(objective).any():
-        only = terms[0].removeprefix("measured_").replace("_", " ") if len(terms) == 1 else ""
-        strips.append((f"objective: {only}" if only else "objective", {"": objective}))
+        strips.append((objective_title(run), {"": objective}))
     efforts = {
         column.removeprefix(EFFORT).replace("_", " "): run.history[column]
         for column in terms

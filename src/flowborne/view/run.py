@@ -105,6 +105,7 @@ class Run(StoredRun):
     controlled  names of the controlled joints
     gravity     (3,) m/s^2
     density     of the fluid, kg/m^3; 0 without fluid
+    objective_unit  unit of the objective; "" if it is not known
     wind        (n, 3) m/s, winds that are drawn if there is no fluid
     geoms       drawn geometries, in the order of geom_position
     flesh       skin of the flesh; None without flesh
@@ -115,6 +116,7 @@ class Run(StoredRun):
 
     def __init__(self, folder: str | Path) -> None:
         super().__init__(folder)
+        files = RunFolder(self.folder)
         with reading(self.folder):
             scene, model = self.tables, self._model
             body_of = dict(zip(self.joints, model.get("joint_bodies", []), strict=False))
@@ -122,6 +124,7 @@ class Run(StoredRun):
             self.accented = frozenset(body_of[j] for j in self.controlled if j in body_of)
             self.gravity = np.asarray(scene.get("gravity", (0.0, 0.0, 0.0)), float)
             self.density = float(scene.get("fluid", {}).get("density", 0.0))
+            self.objective_unit = str(files.read_summary().get("objective_unit", ""))
             self.wind = np.asarray(model["wind"], float).reshape(-1, 3)
             self.geoms = tuple(_geom(entry) for entry in model["geoms"])
             self.flesh = None
@@ -130,7 +133,7 @@ class Run(StoredRun):
             self.carried = tuple(CarriedSkin(entry) for entry in model.get("skins", ()))
             self.sources = _sources(scene)
             self.shot = Shot.model_validate(scene.get("film", {}))
-            self.history = _plotted(RunFolder(self.folder).history)
+            self.history = _plotted(files.history)
             numbers = [*body_of.values(), *(geom.body for geom in self.geoms)]
             numbers += [body for skin in self.carried for body in skin.bodies]
             numbers += self.flesh.bodies if self.flesh else ()

@@ -149,6 +149,28 @@ def test_first_picture_and_three_moments(browser: Any, run: Path, tmp_path: Path
     assert all(drawn(image) > 0.02 for image in moments)
 
 
+def test_a_phone_and_a_server_that_ends(browser: Any, tmp_path: Path) -> None:
+    """The panel is one row until it is tapped, controls have names, and nothing is an error."""
+    run = flowborne.run("ns-block-drag-max", tmp_path / "run", frames=1, workers=1, film=False)
+    page, errors = browser.new_page(viewport={"width": 390, "height": 844}), []
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    page.on("console", lambda said: errors.append(said.text) if said.type == "error" else None)
+    with served("view", str(run.folder)) as address:
+        page.goto(address)
+        title = page.get_by_text("ns-block-drag-max", exact=True)
+        title.wait_for()
+        page.wait_for_function("document.querySelector('[data-shut]')")
+        sleep(1.0)
+        assert title.bounding_box()["y"] > 780.0
+        title.click()
+        page.get_by_role("button", name="next frame").click()
+        page.get_by_text("frame 1 of 1").wait_for()
+        assert page.get_by_role("slider", name="time (s)").count() == 1
+        assert not errors
+    page.get_by_text("flowborne has ended").wait_for(timeout=15_000)
+    page.close()
+
+
 def lean(run: flowborne.OpenRun) -> np.ndarray:
     """(n,) degrees by which the thorax leans forward in each state."""
     thorax = run.bodies.index("thorax")
@@ -174,7 +196,7 @@ def test_a_walker_that_is_played_leans_the_other_way(browser: Any, tmp_path: Pat
         print(page.get_by_text("frames a second").inner_text())
         page.get_by_role("button", name="pause").click()
         page.get_by_text("paused").wait_for()
-        page.get_by_role("button", name="record").click()
+        page.get_by_role("button", name="save as a run").click()
         page.get_by_text("they repeat what was played, bit for bit").wait_for(timeout=60_000)
         page.screenshot(path=shots / "play-2.png")
         page.close()

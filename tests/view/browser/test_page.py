@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from flowborne.view.browser.page import is_own, only_own_requests
+from flowborne.view.browser.gate import guarded, is_own
 from flowborne.view.browser.viewer import open_viewer
 
 pytest.importorskip("viser", reason="the viewer needs viser: pip install 'flowborne[view]'")
@@ -46,7 +46,7 @@ def test_own_requests_have_the_host_that_is_served(
 
 
 def test_a_server_that_is_not_checked_is_no_server() -> None:
-    with pytest.raises(RuntimeError, match="no request is checked"), only_own_requests("lab"):
+    with pytest.raises(RuntimeError, match="no request is checked"), guarded("lab"):
         pass
 
 

@@ -8,8 +8,11 @@ import socket
 import sys
 import tomllib
 from collections.abc import Callable, Iterator
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -161,6 +164,50 @@ def test_a_domain_that_moves_in_space_is_where_it_is(tmp_path: Path) -> None:
     viewer.server.stop()
 
 
+def test_walls_of_a_slab_are_thicker_than_sides_that_fluid_passes(viewer: Viewer) -> None:
+    """The block's stream enters at x_min and leaves at x_max, between walls."""
+    run, scene = viewer.run, viewer.server.scene
+    assert run.grid is not None
+    run.scene["boundaries"] = {"x_min": {"kind": "inflow"}, "x_max": "open", "y_max": "closed"}
+    Surroundings(scene, run, viewer._view)
+    walls = scene._handle_from_node_name["/run/domain/walls"]
+    others = scene._handle_from_node_name["/run/domain/open"]
+    assert walls.thickness > 2.0 * others.thickness
+    low, high = np.array(run.grid.origin), np.array(run.grid.upper)
+    for handle, axis in ((walls, 1), (others, 0)):
+        across = np.asarray(handle.points)[:, :, axis]
+        assert across == pytest.approx(np.array([[low[axis]] * 2, [high[axis]] * 2]))
+
+
+def test_scale_bar_has_the_length_that_it_says(viewer: Viewer) -> None:
+    scene = viewer.server.scene
+    bar = np.asarray(scene._handle_from_node_name["/scale"].points)
+    said = scene._handle_from_node_name["/scale/length"].text
+    assert said == f"{np.linalg.norm(bar[0, 1] - bar[0, 0]):g} m"
+
+
+class Page:
+    """A client with a camera of its own."""
+
+    def __init__(self, width: int, height: int) -> None:
+        self.camera = SimpleNamespace(image_width=width, image_height=height)
+
+    def atomic(self) -> nullcontext[None]:
+        return nullcontext()
+
+
+@pytest.mark.parametrize(("width", "height"), [(1080, 900), (390, 844), (300, 1500)])
+def test_home_shows_the_whole_view_on_every_page(viewer: Viewer, width: int, height: int) -> None:
+    page: Any = Page(width, height)
+    viewer._show_home(page)
+    camera = page.camera
+    half = np.linalg.norm(camera.position - camera.look_at) * np.tan(0.5 * camera.fov)
+    low, high = windows(viewer.run, viewer.run.shot)[0].reshape(2, 2).T
+    assert camera.look_at[:2] == pytest.approx(0.5 * (low + high), abs=0.02)
+    shown = 2.0 * half * np.array([width / height, 1.0]) / (high - low)
+    assert 1.0 < shown.min() < 1.3
+
+
 def test_bodies_are_where_the_run_has_them(viewer: Viewer) -> None:
     for number in (0, 7):
         viewer.timeline.seek(viewer.run.times[number])
@@ -262,7 +309,7 @@ def test_velocity_arrows_point_along_the_velocity(folder: Path) -> None:
 def test_camera_of_a_slab_gives_the_same_film(folder: Path) -> None:
     run = Run(folder)
     view = FilmView.of(run)
-    keys = tomllib.loads(camera_text("run", view.first, True).split("```")[1][4:])["film"]
+    keys = tomllib.loads(camera_text("run", view.first, True).split("\n\n")[0])["film"]
     shot = Shot.model_validate(keys)
     seen = windows(run, shot)[0]
     wanted = windows(run, run.shot)[0]
@@ -271,7 +318,7 @@ def test_camera_of_a_slab_gives_the_same_film(folder: Path) -> None:
 
 def test_camera_keys_are_those_of_a_scene() -> None:
     seen_from = Viewpoint(np.array([7.0, -2.5, 1.25]), np.array([0.1, 0.0, 0.9]), 26.0)
-    keys = tomllib.loads(camera_text("run", seen_from, False).split("```")[1][4:])["film"]
+    keys = tomllib.loads(camera_text("run", seen_from, False).split("\n\n")[0])["film"]
     camera = Shot.model_validate(keys).camera
     assert camera.position == (7.0, -2.5, 1.25)
     assert camera.target == (0.1, 0.0, 0.9)

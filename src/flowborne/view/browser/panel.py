@@ -18,7 +18,7 @@ from flowborne.view.plots import robust_limits, signed, strip_curves
 from flowborne.view.run import Run
 
 if TYPE_CHECKING:
-    from viser import GuiApi
+    from viser import ClientHandle, GuiApi
 
 ARROW_LENGTH = 60.0
 """Length of the arrow of a large force in the legend, pixels."""
@@ -36,6 +36,9 @@ PACES = {"1/8": 0.125, "1/4": 0.25, "1/2": 0.5, "1": 1.0, "2": 2.0}
 """Name of a pace -> seconds of the run per second."""
 
 AXES = "xyz"
+
+Home = Callable[["ClientHandle | None"], None]
+"""Brings the camera of a page to the first view."""
 
 CLOCK = (
     '<div style="padding:8px 12px 2px;display:flex;justify-content:space-between;'
@@ -95,8 +98,9 @@ def _force(forces: Forces) -> str:
 class Curves:
     """The plots of a run, as in its film: the whole run faint, the past bright."""
 
-    def __init__(self, gui: GuiApi, run: Run) -> None:
-        self._gui = gui
+    def __init__(self, gui: GuiApi, run: Run, seconds: float = np.inf) -> None:
+        """`seconds`: of the end of the run that are shown."""
+        self._gui, self._seconds = gui, seconds
         self._shown: list[Any] = []
         self._titles: list[tuple[str, tuple[str, ...]]] = []
         self.plots: list[Any] = []
@@ -105,7 +109,8 @@ class Curves:
     def extend(self, run: Run) -> None:
         """Update the curves to a run with new frames."""
         times = run.history["time_s"]
-        chosen = np.unique(np.linspace(0, len(times) - 1, MAX_SAMPLES).round().astype(int))
+        first = int(np.searchsorted(times, times[-1] - self._seconds)) if len(times) else 0
+        chosen = np.unique(np.linspace(first, len(times) - 1, MAX_SAMPLES).round().astype(int))
         strips = strip_curves(run) if len(times) else []
         titles = [(title, tuple(curves)) for title, curves in strips]
         self._times = times[chosen] if len(times) else times
@@ -116,7 +121,7 @@ class Curves:
             self._replace(titles)
         for plot, values in zip(self.plots, self._values, strict=True):
             low, high = steady_limits(*robust_limits(values))
-            x = steady_limits(float(times[0]), float(times[-1]))
+            x = steady_limits(float(times[first]), float(times[-1]))
             scales = {"x": {"time": False, "range": x}, "y": {"range": (low, high)}}
             if scales != plot.scales:
                 plot.scales = scales
@@ -200,10 +205,16 @@ def _axis(size: int, label: str | None = None) -> Any:
 class Panel:
     """The controls of a run, which change a timeline; `settings` has their values.
 
-    legend  HTML that explains colours and arrows
+    legend   HTML that explains colours and arrows
+    seconds  of the end of the run that the plots show
     """
 
-    def __init__(self, gui: GuiApi, run: Run, view: FilmView, timeline: Timeline) -> None:
+    seconds = np.inf
+
+    def __init__(
+        self, gui: GuiApi, run: Run, view: FilmView, timeline: Timeline, home: Home
+    ) -> None:
+        """`home`: brings the camera of a page to the first view."""
         self._timeline = timeline
         self._controls: dict[str, Any] = {}
         self._slider_time = 0.0
@@ -216,7 +227,8 @@ class Panel:
         self._add_time(gui)
         self.legend = gui.add_html("")
         self._add_shown(gui, run, view)
-        self.curves = Curves(gui, run)
+        self._add_home(gui, home)
+        self.curves = Curves(gui, run, self.seconds)
 
     @property
     def settings(self) -> Settings:
@@ -275,6 +287,11 @@ class Panel:
         self._add_key(gui, "frame before", "arrowleft", moves["◀"])
         self._add_key(gui, "newest frame", "end", timeline.show_newest)
         self._pace = gui.add_dropdown("pace", list(PACES), initial_value="1")
+
+    def _add_home(self, gui: GuiApi, home: Home) -> None:
+        button, key = gui.add_button_group("view", ["home"]), gui.add_command("home", hotkey="home")
+        button.on_click(lambda event: home(event.client))
+        key.on_trigger(lambda event: home(event.client))
 
     def _add_key(self, gui: GuiApi, name: str, key: Any, does: Callable[[], None]) -> None:
         gui.add_command(name, hotkey=key).on_trigger(lambda _: does())

@@ -18,13 +18,22 @@ from flowborne.view.space.lighting import LIGHTS
 from flowborne.view.space.surroundings import SQUARE, stands_on_ground
 
 if TYPE_CHECKING:
-    from viser import LineSegmentsHandle, SceneApi
+    from viser import SceneApi
 
 MOTES = 20_000
 """Number of motes in a cube around the domain."""
 
 MARKED_AGAIN = 0.05
 """Way of the domain after which the marks in it are chosen again, in its smaller sides."""
+
+ABOVE_IMAGE = 1e-3
+"""Height of lines above the image of a slab, in smaller sides of the view."""
+
+WALLS = ("closed", "no-slip")
+"""Kinds of sides that no fluid passes; the first one is the default."""
+
+SCALE = 0.2
+"""Largest length of the scale bar, in smaller sides of the view."""
 
 LIGHT_RATIO = 3.0
 """Strength of a light in a browser over that in a film: browsers divide it by pi."""
@@ -50,9 +59,11 @@ class Surroundings:
         _add_lights(scene, run.is_slab, ground)
         if ground:
             _add_ground(scene, view)
-        self._edges: LineSegmentsHandle | None = None
-        if run.grid is not None and not run.is_slab:
-            self._edges = _add_edges(scene, run.grid)
+        self._domain = scene.add_frame("/run/domain", show_axes=False)
+        if run.grid is not None:
+            _add_edges(scene, run, run.grid, view)
+        if run.is_slab and run.shot.scale_bar:
+            _add_scale(scene, view)
         follows = bool(run.window_axes) or camera_moves(view.path, view.side)
         self._has_marks = run.grid is not None and not ground and follows
         self._marked: Array | None = None
@@ -62,8 +73,7 @@ class Surroundings:
 
     def show(self, moved: Array) -> None:
         """Show the domain moved by (3,) m from its start; marks are fixed in the water."""
-        if self._edges is not None:
-            self._edges.position = moved
+        self._domain.position = moved
         if not self._has_marks:
             return
         run, view = self._run, self._view
@@ -114,14 +124,9 @@ def _add_marks(scene: SceneApi, low: Array, high: Array, view: FilmView, slab: b
     """Add marks that are fixed in the water between two corners, to show that the view moves."""
     if slab:
         strokes = crosses(low[:2], high[:2], view.side)
-        above = 1e-3 * view.side
-        scene.add_line_segments(
-            "/run/marks",
-            np.pad(strokes, ((0, 0), (0, 0), (0, 1)), constant_values=above).astype(np.float32),
-            style.rgb(style.MOTES),
-            thickness=1.0,
-            thickness_units="screen",
-        )
+        above = ((0, 0), (0, 0), (0, 1))
+        ends = np.pad(strokes, above, constant_values=ABOVE_IMAGE * view.side)
+        _add_lines(scene, "/run/marks", ends, style.MOTES, 1.0)
         return
     reach = 0.5 * float((high - low).max())
     middle = 0.5 * (low + high)
@@ -135,13 +140,40 @@ def _add_marks(scene: SceneApi, low: Array, high: Array, view: FilmView, slab: b
     )
 
 
-def _add_edges(scene: SceneApi, grid: Grid) -> LineSegmentsHandle:
-    return scene.add_line_segments(
-        "/run/domain",
-        box_edges(np.array(grid.origin), np.array(grid.upper)).astype(np.float32),
-        style.rgb(style.LINE),
-        thickness=1.5,
-        thickness_units="screen",
+def _add_edges(scene: SceneApi, run: Run, grid: Grid, view: FilmView) -> None:
+    """Add the edges of the domain; in a slab its walls are thicker than sides that fluid passes."""
+    low, high = np.array(grid.origin), np.array(grid.upper)
+    if not run.is_slab:
+        _add_lines(scene, "/run/domain/edges", box_edges(low, high), style.LINE, 1.5)
+        return
+    walls: list[Array] = []
+    others: list[Array] = []
+    for axis, name in enumerate("xy"):
+        for end, coordinate in (("min", low[axis]), ("max", high[axis])):
+            given = run.scene.get("boundaries", {}).get(f"{name}_{end}", WALLS[0])
+            kind = given if isinstance(given, str) else given["kind"]
+            line = np.stack([low, high])
+            line[:, axis], line[:, 2] = coordinate, ABOVE_IMAGE * view.side
+            (walls if kind in WALLS else others).append(line)
+    _add_lines(scene, "/run/domain/walls", np.reshape(walls, (-1, 2, 3)), style.FIXED, 4.0)
+    _add_lines(scene, "/run/domain/open", np.reshape(others, (-1, 2, 3)), style.MOTES, 1.2)
+
+
+def _add_scale(scene: SceneApi, view: FilmView) -> None:
+    """Add a bar of a round length in the lower left corner of the first view of a slab."""
+    length = round_number(SCALE * view.side)
+    start = view.first.target - view.side * np.array([0.46, 0.46, -ABOVE_IMAGE])
+    along, tick = np.array([length, 0.0, 0.0]), np.array([0.0, 0.012 * view.side, 0.0])
+    end = start + along
+    bar = np.array([(start, end), (start - tick, start + tick), (end - tick, end + tick)])
+    _add_lines(scene, "/scale", bar, style.TEXT, 2.0)
+    scene.add_label("/scale/length", f"{length:g} m", position=end + tick, anchor="bottom-left")
+
+
+def _add_lines(scene: SceneApi, name: str, ends: Array, colour: str, pixels: float) -> None:
+    """Add lines between `ends` (n, 2, 3), m."""
+    scene.add_line_segments(
+        name, ends.astype(np.float32), style.rgb(colour), thickness=pixels, thickness_units="screen"
     )
 
 

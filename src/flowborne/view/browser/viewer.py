@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import socket
-from contextlib import suppress
+from contextlib import redirect_stdout, suppress
+from dataclasses import replace
+from io import StringIO
 from pathlib import Path
 from time import monotonic, sleep
 from typing import TYPE_CHECKING, Any
@@ -16,18 +18,20 @@ from flowborne.base.extras import optional
 from flowborne.kernels.arrays import Array
 from flowborne.runs.run_folder import RunFolder, RunFolderError, reading
 from flowborne.runs.states import read_state
+from flowborne.view import style
 from flowborne.view.browser.fluid import MIN_IMAGE_SIDE, Fluid
-from flowborne.view.browser.page import only_own_requests, style_page
+from flowborne.view.browser.gate import Gate, guarded
+from flowborne.view.browser.page import style_page
 from flowborne.view.browser.panel import Panel, legend_html
 from flowborne.view.browser.settings import Settings, Timeline
 from flowborne.view.browser.solids import Bodies, ForceArrows, SkinMesh
 from flowborne.view.browser.surroundings import Surroundings
-from flowborne.view.browser.viewpoint import CameraKeys, FilmView
+from flowborne.view.browser.viewpoint import ASPECT, PHONE, CameraKeys, FilmView
 from flowborne.view.framing import window_path
 from flowborne.view.run import Run, State
 
 if TYPE_CHECKING:
-    from viser import ViserServer
+    from viser import ClientHandle
 
 
 class GrowingRun(Run):
@@ -81,18 +85,21 @@ class RunView:
     run       with the frames so far
     timeline  the current time
     panel     the controls
+    margin    distance of the first camera, in that of the film's
     """
 
     image_side = MIN_IMAGE_SIDE
+    margin = 1.05
 
-    def __init__(self, server: ViserServer, run: Run, folder: str) -> None:
+    def __init__(self, gate: Gate, run: Run, folder: str) -> None:
         """`folder`: of the run, for commands.
 
         raises  ValueError if the shot of the run's scene does not fit it
         """
-        self.server, self.folder = server, folder
+        self._gate, self.server, self.folder = gate, gate.server, folder
         self._shown: tuple[Any, ...] | None = None
         self._open(run)
+        self.server.on_client_connect(self._show_home)
 
     def tick(self, seconds: float) -> None:
         """Advance by seconds of real time, and update the scene if anything changed."""
@@ -112,13 +119,18 @@ class RunView:
         """Wait until the next tick is due."""
         sleep(seconds)
 
+    def close(self) -> None:
+        """Stop the server; its pages say so."""
+        self._gate.stop()
+
     def _open(self, run: Run) -> None:
         """Show another run from its beginning."""
         server = self.server
         server.scene.reset()
         server.gui.reset()
         style_page(server, run.name)
-        self.run, self._view = run, self._first_view(run)
+        self.run, self._view = run, self._first_view(run, ASPECT)
+        self._narrow_view = self._first_view(run, PHONE)
         self._path = list(self._view.path)
         self.timeline = Timeline(run.times)
         first, side = self._view.first, self._view.side
@@ -137,11 +149,20 @@ class RunView:
         self._along = np.zeros(3)
         self._shown = None
 
-    def _first_view(self, run: Run) -> FilmView:
-        return FilmView.of(run)
+    def _first_view(self, run: Run, aspect: float) -> FilmView:
+        view = FilmView.of(run, aspect)
+        first = view.first
+        away = self.margin * (first.position - first.target)
+        return replace(view, first=replace(first, position=first.target + away))
+
+    def _show_home(self, client: ClientHandle | None) -> None:
+        """Bring the camera of a page, if it is still there, to the first view that suits it."""
+        if client is not None:
+            narrow = client.camera.image_height > client.camera.image_width
+            (self._narrow_view if narrow else self._view).show_to(client)
 
     def _new_panel(self) -> Panel:
-        return Panel(self.server.gui, self.run, self._view, self.timeline)
+        return Panel(self.server.gui, self.run, self._view, self.timeline, self._show_home)
 
     def _measure(self) -> None:
         """Take scales from the frames so far; repeated whenever their number doubles."""
@@ -159,6 +180,8 @@ class RunView:
         state = self.run.state(number)
         self._along = self._path[number] if settings.follow else np.zeros(3)
         names, scales = ((), ()) if self._fluid is None else self._fluid.legend(settings)
+        if self.run.accented:
+            names = [("body on a controlled joint", style.ACCENT), *names]
         with self.server.atomic():
             # moved like the bodies, and not added anew: a browser would do that some frames later
             self._surroundings.root.position = -self._along
@@ -225,17 +248,18 @@ def open_viewer(folder: Path, host: str, port: int) -> Viewer:
     return Viewer(start_server(host, port), run, str(folder))
 
 
-def start_server(host: str, port: int) -> ViserServer:
-    """A server of a page. Raises SceneError as `open_viewer` does."""
+def start_server(host: str, port: int) -> Gate:
+    """A server of a page, behind its gate. Raises SceneError as `open_viewer` does."""
     viser = optional("viser", "viser", "view", "views in a browser")
     _check_free(host, port)
-    with only_own_requests(host):
-        server: ViserServer = viser.ViserServer(host=host, port=port, verbose=False)
-    return server
+    # viser prints a frame with its addresses, which our own line has
+    with guarded(host) as gate, redirect_stdout(StringIO()):
+        gate.server = viser.ViserServer(host=host, port=port, verbose=False)
+    return gate
 
 
 def serve(viewer: RunView) -> None:
-    """Keep a viewer up to date until it is interrupted."""
+    """Keep a viewer up to date until it is interrupted. Raises KeyboardInterrupt then."""
     before = looked = monotonic()
     while True:
         now = monotonic()

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from html import escape
+from shlex import quote
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -13,10 +15,12 @@ from flowborne.view.run import Run
 from flowborne.view.space.camera import camera_of
 
 if TYPE_CHECKING:
-    from viser import ClientHandle, GuiMarkdownHandle
+    from viser import ClientHandle, GuiHtmlHandle
 
-ASPECT = 0.75
+ASPECT, PHONE = 0.75, 1.9
 """Approximate height over width of the part of a browser's window that shows the run."""
+
+PREFORMATTED = '<pre style="margin:0;padding:2px 12px 8px;white-space:pre-wrap">{}</pre>'
 
 LAST = 1e9
 """Order of the last item in the panel; viser counts others up from the clock."""
@@ -58,30 +62,43 @@ class FilmView:
     path    (n, 3) m, displacement of the film's camera since then
     side    m, smaller side of the view
     up      axis that is up in the view, "+y" or "+z"
+    aspect  height over width of the page for which it is made
     """
 
     first: Viewpoint
     path: Array
     side: float
     up: Literal["+y", "+z"]
+    aspect: float
 
     @classmethod
-    def of(cls, run: Run) -> FilmView:
+    def of(cls, run: Run, aspect: float = ASPECT) -> FilmView:
         """raises  ValueError if its camera follows a body that does not exist"""
         lens = run.shot.camera.lens
         if run.is_slab:
-            views = windows(run, run.shot, ASPECT)
+            views = windows(run, run.shot, aspect)
             path = np.column_stack([views[:, :2].mean(axis=1), views[:, 2:].mean(axis=1)])
             path = np.pad(path, ((0, 0), (0, 1)))
             sides = views[0, [1, 3]] - views[0, [0, 2]]
-            height = max(sides[1], ASPECT * sides[0])
+            height = max(sides[1], aspect * sides[0])
             away = np.array([0.0, 0.0, 0.5 * height / np.tan(0.5 * np.radians(lens))])
-            return cls(Viewpoint(path[0] + away, path[0], lens), path - path[0], sides.min(), "+y")
-        camera = camera_of(run, run.shot, ASPECT)
+            first = Viewpoint(path[0] + away, path[0], lens)
+            return cls(first, path - path[0], sides.min(), "+y", aspect)
+        camera = camera_of(run, run.shot, aspect)
         focus = camera.focus
         first = Viewpoint(focus[0] + camera.away[0], focus[0], lens)
         side = min(camera.width, camera.height)
-        return cls(first, focus - focus[0], side, "+z")
+        return cls(first, focus - focus[0], side, "+z", aspect)
+
+    def show_to(self, client: ClientHandle) -> None:
+        """Bring the camera of a page to the first viewpoint, farther away if it is narrower."""
+        first, camera = self.first, client.camera
+        narrow = max(1.0, camera.image_height / camera.image_width / self.aspect)
+        with client.atomic():
+            camera.up_direction = np.eye(3)["xyz".index(self.up[1])]
+            camera.position = first.target + narrow * (first.position - first.target)
+            camera.look_at = first.target
+            camera.fov = float(np.radians(first.lens))
 
 
 class CameraKeys:
@@ -92,7 +109,7 @@ class CameraKeys:
 
     def __init__(self, folder: str, slab: bool) -> None:
         self._folder, self._slab = folder, slab
-        self._texts: dict[int, GuiMarkdownHandle] = {}
+        self._texts: dict[int, GuiHtmlHandle] = {}
 
     def show(self, clients: dict[int, ClientHandle], along: Array) -> None:
         """Update the texts.
@@ -105,19 +122,19 @@ class CameraKeys:
                 continue
             if key not in self._texts:
                 with client.gui.add_folder("camera", expand_by_default=False, order=LAST):
-                    self._texts[key] = client.gui.add_markdown("")
+                    self._texts[key] = client.gui.add_html("")
             camera = client.camera
             seen_from = Viewpoint(
                 camera.position + along, camera.look_at + along, float(np.degrees(camera.fov))
             )
-            text = camera_text(self._folder, seen_from, self._slab)
+            text = PREFORMATTED.format(escape(camera_text(self._folder, seen_from, self._slab)))
             if text != self._texts[key].content:
                 self._texts[key].content = text
 
 
 def camera_text(folder: str, seen_from: Viewpoint, slab: bool) -> str:
-    """Markdown with the table of a scene and the command for the same view in a film."""
+    """The table of a scene and the command for the same view in a film."""
     keys = seen_from.film_keys(slab)
     table = "\n".join(f"{key} = {value}" for key, value in keys.items())
     settings = " ".join(f'--set "camera.{key}={value}"' for key, value in keys.items())
-    return f"```toml\n[film.camera]\n{table}\n```\n\n```sh\nflowborne film {folder} {settings}\n```"
+    return f"[film.camera]\n{table}\n\nflowborne film {quote(folder)} {settings}"
