@@ -150,7 +150,7 @@ def _add_edges(scene: SceneApi, run: Run, grid: Grid, view: FilmView) -> None:
     others: list[Array] = []
     for axis, name in enumerate("xy"):
         for end, coordinate in (("min", low[axis]), ("max", high[axis])):
-            given = run.scene.get("boundaries", {}).get(f"{name}_{end}", WALLS[0])
+            given = run.tables.get("boundaries", {}).get(f"{name}_{end}", WALLS[0])
             kind = given if isinstance(given, str) else given["kind"]
             line = np.stack([low, high])
             line[:, axis], line[:, 2] = coordinate, ABOVE_IMAGE * view.side
