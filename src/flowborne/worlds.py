@@ -111,7 +111,8 @@ def make_world(
     grid           of the fluid; None for a world without fluid
     slab           whether the bodies move in the plane; that of the grid by default
     gravity        m/s^2, of a model given as text
-    solid_density  kg/m^3 of every geom of a model given as text, in place of its own
+    solid_density  kg/m^3 of every geom of a model given as text, in place of its own; a geom with a
+                   mass keeps it
     motions        prescribed motions of joints
     winds          simple winds
     fluid          its properties; the density is 1 kg/m^3 by default
