@@ -149,7 +149,7 @@ def test_what_of_the_file_has_no_effect_is_said_once(written: Written) -> None:
 def test_what_overrules_a_density_of_the_scene_is_said(written: Written) -> None:
     bone = '<geom_class="bone"_size=".1"/>'
     for given, said in (
-        ('mass="900"', "[solids] density for geoms of hand that have a mass in the file, which wins"),
+        ('mass="900"', "[solids] density for geoms of hand that have a mass in the file"),
         ('density="900"', "the density of geoms of hand, which [solids] density replaces"),
     ):
         geom = {bone: f'<geom class="bone" size=".1" {given}/>'}
