@@ -36,6 +36,7 @@ from flowborne.scenes.warn_bodies import (
 from flowborne.scenes.warn_speed import fast_bodies, fast_flow, unlike_the_sea
 from flowborne.scenes.warn_stops import past_stops, soft_stops
 from flowborne.scenes.warn_trim import counted_twice, pinned_under_lid
+from flowborne.scenes.warn_units import densities_alone, gravity, ranges, sizes, slow_steps
 from flowborne.solids.model import SLIDE, joint_kind, joint_unit
 
 LEAST_STRENGTH = 2.0 * math.pi
@@ -151,6 +152,9 @@ Warn = Callable[[Scene, Setup], Iterator[str]]
 """Warnings of one kind about a scene and what was built of it."""
 
 WARNINGS: tuple[Warn, ...] = (
+    sizes,
+    gravity,
+    densities_alone,
     thin_bodies,
     lost_in_domain,
     implausible_density,
@@ -163,6 +167,8 @@ WARNINGS: tuple[Warn, ...] = (
     fixed_outside,
     fast_bodies,
     fast_flow,
+    slow_steps,
+    ranges,
     angles_in_radians,
     too_slow,
     limp_joints,
