@@ -126,7 +126,7 @@ def _standing_still(scene: Scene) -> Iterator[str]:
     if earlier is not None and earlier.length < run - 0.5 * scene.frame_time:
         yield (
             f"[earlier]: that run is {earlier.length:.3g} s long and this one {run:.3g} s; its "
-            "joints stand still from there. It goes on with --resume and --frames"
+            "joints stand still from there. It goes on when it is resumed with more frames"
         )
     table, capture = scene.clip, capture_of(scene)
     if table is None or capture is None or table.file is None or table.loop:
