@@ -14,7 +14,7 @@ from flowborne.base.errors import SceneError
 from flowborne.scenes import warn_units
 from flowborne.scenes.build import build
 from flowborne.scenes.load import load_scene, scene_names
-from flowborne.scenes.warn import warnings_of
+from flowborne.scenes.warn import WARNINGS, warnings_of
 
 MODEL = """
 <mujoco>
@@ -70,8 +70,9 @@ def said(scene: fb.Scene) -> list[str]:
 def test_no_built_in_scene_is_in_another_unit(name: str) -> None:
     scene = load_scene(name)
     setup = build(scene).world.setup
-    kinds = warn_units.sizes, warn_units.gravity, warn_units.densities_alone, warn_units.ranges
-    assert [w for kind in (*kinds, warn_units.slow_steps) for w in kind(scene, setup)] == []
+    kinds = [kind for kind in WARNINGS if kind.__module__ == warn_units.__name__]
+    assert len(kinds) == 7
+    assert [w for kind in kinds for w in kind(scene, setup)] == []
 
 
 def test_a_sound_scene_without_a_fluid_has_no_warning(swung: Swung) -> None:
@@ -81,13 +82,20 @@ def test_a_sound_scene_without_a_fluid_has_no_warning(swung: Swung) -> None:
 IN_MILLIMETRES = {'size="0.05 0.05 0.2" pos="0 0 -0.2"': 'size="50 50 200" pos="0 0 -200"'}
 
 
+WIND = '[[wind]]\nkind = "faces"\nvelocity = [144.0, 0.0, 0.0]\n'
+INERTIAL = '<inertial pos="0 0 0" mass="1" diaginertia="{0} {0} {0}"/>'
+
+
 @pytest.mark.parametrize(
     ("new", "expected"),
     [
-        (IN_MILLIMETRES, "if these are millimetres, 0.001 times each makes it 0.3"),
+        (IN_MILLIMETRES, "they measure 0.371 m if in millimetres and 3.71 m if in centimetres"),
         ({"density = 500.0": "density = 0.5"}, "that of foam is 10; water has 1000 kg/m^3"),
         ({"density = 500.0": "density = 5e5"}, "that of osmium is 22600; water has 1000 kg/m^3"),
+        ({"-9.81": "9.81"}, "gravity: it points up; -9.81 m/s^2 along z points down"),
         ({"-9.81": "-9810.0"}, "gravity: 9810 m/s^2, and the Sun has 274; 9810 mm/s^2 are 9.81 m"),
+        ({"[initial]": WIND + "[initial]"}, "[[wind]] 1: 144 m/s, and the strongest gust"),
+        ({"<geom": f"{INERTIAL.format(1000)}<geom"}, "the <inertial> of arm has its mass 31.6 m"),
         ({'angle="degree"': 'angle="radian"'}, "the range of hinge ends 14.3 turns away; 90 rad"),
         ({"-90 90": "-1.57 1.57", "= 40.0": "= 0.5"}, "hinge turns by 1.57 degrees at most; "),
     ],
@@ -101,7 +109,7 @@ def test_numbers_in_another_unit(swung: Swung, new: dict[str, str], expected: st
 def test_a_grain_in_kilometres(swung: Swung) -> None:
     new = {'size="0.05 0.05 0.2" pos="0 0 -0.2"': 'size="5e-5 5e-5 2e-4" pos="0 0 -2e-4"'}
     scene = swung(new | {"<compiler ": '<compiler boundmass="1e-6" boundinertia="1" '})
-    assert "if these are kilometres, 1000 times each makes it 0.3" in said(scene)[0]
+    assert "and they measure 0.371 m if in kilometres" in said(scene)[0]
 
 
 def test_people_weigh_what_people_do(swung: Swung) -> None:

@@ -36,7 +36,15 @@ from flowborne.scenes.warn_bodies import (
 from flowborne.scenes.warn_speed import fast_bodies, fast_flow, unlike_the_sea
 from flowborne.scenes.warn_stops import past_stops, soft_stops
 from flowborne.scenes.warn_trim import counted_twice, pinned_under_lid
-from flowborne.scenes.warn_units import densities_alone, gravity, ranges, sizes, slow_steps
+from flowborne.scenes.warn_units import (
+    densities_alone,
+    gravity,
+    inertias,
+    ranges,
+    sizes,
+    slow_steps,
+    winds,
+)
 from flowborne.solids.model import SLIDE, joint_kind, joint_unit
 
 LEAST_STRENGTH = 2.0 * math.pi
@@ -154,7 +162,9 @@ Warn = Callable[[Scene, Setup], Iterator[str]]
 WARNINGS: tuple[Warn, ...] = (
     sizes,
     gravity,
+    winds,
     densities_alone,
+    inertias,
     thin_bodies,
     lost_in_domain,
     implausible_density,

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 
 import numpy as np
-from scipy.linalg import eigh
+from scipy.linalg import LinAlgError, eigh
 
 from flowborne.base.phrases import and_more, listed
 from flowborne.base.tables import MOST_STEPS
@@ -19,10 +19,9 @@ from flowborne.scenes.warn_bodies import DENSEST, mean_densities
 from flowborne.solids.model import BALL, HINGE, SolidModel
 from flowborne.solids.scratch import scratch
 
-SHORTEST, LONGEST = 1e-3, 100.0
-"""m. Three times a blue whale (33 m); the smallest insects that fly measure 0.2 mm, and those that
-are filmed a few mm. A creature of 10 cm or more in millimetres is longer. Swimmers of micrometres
-are in a fluid."""
+SHORTEST, LONGEST, LONGEST_HULL = 1e-3, 34.0, 460.0
+"""m. The longest animal is the blue whale (33 m), the longest hull that of a ship (458 m, Seawise
+Giant). Swimmers of less than a millimetre are in a fluid."""
 
 LIGHTEST = 10.0
 """kg/m^3, of the lightest foams of polystyrene. Solids in g/cm^3 have 0.1 to 8."""
@@ -32,6 +31,13 @@ SMALLEST_PERSON, HEAVIEST_PERSON = 1.0, 635.0
 
 STRONGEST_GRAVITY = 274.0
 """m/s^2 on the Sun. On the Earth it is 9810 mm/s^2."""
+
+STRONGEST_WIND = 113.0
+"""m/s, the strongest gust on record (WMO: Barrow Island, 1996). That is 408 km/h."""
+
+WIDEST = math.sqrt(3.0 / 8.0)
+"""Jung's theorem: what is L long lies within a ball of this times L in radius, and no radius of
+gyration is longer. With inertia in kg mm^2 it is a thousand times as long."""
 
 MOST_TURNS = 2.0
 """Turns of a joint to one side that a cable through it survives. 13 degrees read as radians are
@@ -55,13 +61,14 @@ NUDGE = 1e-5
 def sizes(scene: Scene, setup: Setup) -> Iterator[str]:
     """Creatures that are longer than any, or without a fluid shorter; and people of other weights
     than people have."""
-    length = float(max(creature_extent(scene, setup), default=0.0))
-    short = setup.fluid is None and 0.0 < length < SHORTEST
-    if short or length > LONGEST:
-        unit, factor = ("kilometres", 1e3) if short else ("millimetres", 1e-3)
+    length, dry = float(max(creature_extent(scene, setup), default=0.0)), setup.fluid is None
+    short = dry and 0.0 < length < SHORTEST
+    if short or length > (LONGEST if dry else LONGEST_HULL):
+        meant = [(1e-3, "millimetres"), (1e-2, "centimetres")]
+        units = " and ".join(f"{f * length:.3g} m if in {u}" for f, u in meant)
         yield (
-            f"[solids]: the bodies measure {length:.3g} m; lengths in a model are metres, and if "
-            f"these are {unit}, {factor:g} times each makes it {factor * length:.3g} m"
+            f"[solids]: the bodies measure {length:.3g} m; lengths in a model are metres, and they "
+            f"measure {f'{1e3 * length:.3g} m if in kilometres' if short else units}"
         )
     if scene.human is not None and not (SMALLEST_PERSON <= scene.human.mass <= HEAVIEST_PERSON):
         mass = scene.human.mass
@@ -89,12 +96,44 @@ def densities_alone(scene: Scene, setup: Setup) -> Iterator[str]:
 
 
 def gravity(scene: Scene, setup: Setup) -> Iterator[str]:
-    """Gravity in mm/s^2."""
-    strength = float(np.linalg.norm(scene.gravity))
-    if scene.has_bodies and strength > STRONGEST_GRAVITY:
+    """Gravity in mm/s^2, and gravity that points up."""
+    if not scene.has_bodies:
+        return
+    strength, up = float(np.linalg.norm(scene.gravity)), scene.dimensions - 1
+    if strength and scene.gravity[up] == strength:
+        yield f"gravity: it points up; -{strength:g} m/s^2 along {'xyz'[up]} points down"
+    if strength > STRONGEST_GRAVITY:
         yield (
             f"gravity: {strength:g} m/s^2, and the Sun has {STRONGEST_GRAVITY:g}; "
             f"{strength:g} mm/s^2 are {1e-3 * strength:g} m/s^2"
+        )
+
+
+def winds(scene: Scene, setup: Setup) -> Iterator[str]:
+    """Winds in km/h or mm/s."""
+    for number, wind in enumerate(scene.wind, start=1):
+        speed = float(np.linalg.norm(getattr(wind, "velocity", 0.0)))
+        if speed > STRONGEST_WIND:
+            yield (
+                f"[[wind]] {number}: {speed:.4g} m/s, and the strongest gust on record had "
+                f"{STRONGEST_WIND:g}; {speed:.4g} km/h are {speed / 3.6:.3g} m/s, and mm/s "
+                f"{1e-3 * speed:.3g}"
+            )
+
+
+def inertias(scene: Scene, setup: Setup) -> Iterator[str]:
+    """Bodies with a larger inertia than their mass can have within the creature."""
+    model, length = setup.solid, float(np.linalg.norm(creature_extent(scene, setup)))
+    moving = np.flatnonzero(model.moving & (model.body_mass[: model.nbody] > 0.0))
+    largest = model.mj.body_inertia[moving].max(axis=1, initial=0.0)
+    radius = np.sqrt(largest / model.body_mass[moving])
+    wide = np.flatnonzero(radius > WIDEST * length * (1.0 + 1e-9)) if length else []
+    if len(wide):
+        names = [model.body_names[moving[n]] for n in wide]
+        yield (
+            f"[solids]: the <inertial> of {and_more(names)} has its mass {radius[wide[0]]:.3g} m "
+            f"from its centre, and the bodies measure {length:.3g} m; inertia is in kg m^2, a "
+            "millionth of it in kg mm^2"
         )
 
 
@@ -169,7 +208,10 @@ def _fastest(model: SolidModel, q: Array, dofs: Integers) -> tuple[float, int]:
     stiffness = np.array([(force(d, -NUDGE) - force(d, NUDGE)) / (2.0 * NUDGE) for d in dofs])
     s.smooth_forces(q, still, still)
     mass = s.mass_matrix()[np.ix_(dofs, dofs)]
-    values, modes = eigh(0.5 * (stiffness + stiffness.T), mass)
+    try:
+        values, modes = eigh(0.5 * (stiffness + stiffness.T), mass)
+    except (LinAlgError, ValueError):  # of numbers that overflow, with which a run blows up
+        return 0.0, 0
     rates = np.sqrt(np.abs(values))
     damping = (model.mj.dof_damping[dofs, None] * modes**2).sum(axis=0)
     rates[damping >= 2.0 * rates] = 0.0
