@@ -127,8 +127,8 @@ def inertias(scene: Scene, setup: Setup) -> Iterator[str]:
     moving = np.flatnonzero(model.moving & (model.body_mass[: model.nbody] > 0.0))
     largest = model.mj.body_inertia[moving].max(axis=1, initial=0.0)
     radius = np.sqrt(largest / model.body_mass[moving])
-    wide = np.flatnonzero(radius > WIDEST * length * (1.0 + 1e-9)) if length else []
-    if len(wide):
+    wide = np.flatnonzero((radius > WIDEST * length * (1.0 + 1e-9)) & (length > 0.0))
+    if wide.size:
         names = [model.body_names[moving[n]] for n in wide]
         yield (
             f"[solids]: the <inertial> of {and_more(names)} has its mass {radius[wide[0]]:.3g} m "
