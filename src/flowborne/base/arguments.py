@@ -15,11 +15,13 @@ from typing import Any, NamedTuple, ParamSpec, TypeVar
 import numpy as np
 
 from flowborne.base.errors import SceneError
-from flowborne.base.given import possible_path
 from flowborne.base.tables import LARGEST, MOST_COUNT
 
 P = ParamSpec("P")
 Answer = TypeVar("Answer")
+
+LONGEST_PART = 255
+"""Most bytes of a name in a path, on all systems in use."""
 
 SHOWN = 60
 """Most letters of a wrong argument in a message."""
@@ -164,7 +166,8 @@ def _not_negative(value: Any) -> float:
 
 def _path(value: Any) -> Any:
     text = os.fspath(value)
-    if not (text and possible_path(text)):
+    longest = max((len(part.encode()) for part in Path(text).parts), default=0)
+    if not text or "\0" in text or longest > LONGEST_PART:
         raise ValueError
     return value if isinstance(value, str) else Path(text)
 

@@ -62,16 +62,10 @@ def possible_name(value: str) -> str:
     """The name, if a file can have it. Raises ValueError otherwise."""
     if SPECIAL & set(value):
         raise ValueError(f"is {value[:60]!r}, with special characters in it. {BACKSLASH}")
-    if not possible_path(value):
+    lengths = [len(part.encode()) for part in Path(value).parts]
+    if "\0" in value or sum(lengths) > MOST_PATH or max(lengths, default=0) > LONGEST_NAME:
         raise ValueError("is no name that a file can have. Shorten it, without letters of no width")
     return value
-
-
-def possible_path(value: str) -> bool:
-    """Whether a file can have this path."""
-    lengths = [len(part.encode()) for part in Path(value).parts]
-    short = sum(lengths) <= MOST_PATH and max(lengths, default=0) <= LONGEST_NAME
-    return short and "\0" not in value
 
 
 def check_file(path: Path, most: int | None = MOST_BYTES) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import tomli_w
 
-from flowborne.base.arguments import PATH, POSITIVE, TEXT, or_none, takes
+from flowborne.base.arguments import NUMBER, PATH, TEXT, or_none, takes
 from flowborne.base.errors import SceneError
 from flowborne.characters.division import Division, divided
 from flowborne.characters.limits import check_work
@@ -65,8 +65,8 @@ class Imported:
     out=PATH,
     clip=or_none(TEXT),
     animations=or_none(PATH),
-    density=POSITIVE,
-    scale=POSITIVE,
+    density=NUMBER,
+    scale=NUMBER,
 )
 def import_character(
     file: str | Path,

@@ -81,7 +81,7 @@ def clip_number(source: Source, clip: str | None, name: str) -> int:
     """
     if not source.clips:
         raise SceneError(
-            f"{name} has no clip. Give animations: a file with clips for the same joint names."
+            f"{name} has no clip. Name a file with clips for the same joints as its animations."
         )
     if clip is None and len(source.clips) > 1:
         raise SceneError(
