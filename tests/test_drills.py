@@ -37,7 +37,7 @@ def test_a_second_run_into_the_folder_of_one_that_goes_on_is_refused(small_scene
     process = start([small_scene, "--out", out, "--frames", "100000", "--no-film"])
     try:
         wait_for_rows(process, out / "history.csv", 3)
-        with pytest.raises(RunFolderError, match=r"another run is being written into .*--out"):
+        with pytest.raises(RunFolderError, match=r"being written into .*another folder"):
             run(small_scene, out, **option)
         wait_for_rows(process, out / "history.csv", 6)
     finally:
@@ -154,7 +154,7 @@ def test_a_checkpoint_of_another_kind_is_one_message(small_scene, tmp_path, cont
             np.save(file, np.array([content, {}], object), allow_pickle=True)
         else:
             np.save(file, content)
-    with pytest.raises(RunFolderError, match=r"is not a checkpoint .*--replace"):
+    with pytest.raises(RunFolderError, match=r"is not a checkpoint .*replace=True"):
         run(small_scene, out, resume=True)
 
 
@@ -163,7 +163,7 @@ def test_a_locked_archive_is_one_message(small_scene, tmp_path):
     run(small_scene, out, frames=2)
     with zipfile.ZipFile(out / "checkpoint.npz", "w") as archive:
         archive.writestr("frame.npy", b"no array")
-    with pytest.raises(RunFolderError, match=r"is not a checkpoint .*--replace"):
+    with pytest.raises(RunFolderError, match=r"is not a checkpoint .*replace=True"):
         run(small_scene, out, resume=True)
 
 

@@ -15,6 +15,7 @@ from typing import TypedDict, Unpack
 import numpy as np
 from scipy.interpolate import RegularGridInterpolator
 
+from flowborne.base.arguments import COUNT, POSITIVE, VECTOR, one_of, or_none, takes
 from flowborne.coupling.cut import cut_by_bodies, following, volumes_of
 from flowborne.coupling.report import Outcome, StepReport
 from flowborne.coupling.start import set_going, start
@@ -96,6 +97,12 @@ class FluidProperties(TypedDict, total=False):
     scalars: tuple[str, ...]
 
 
+@takes(
+    model=one_of(str, SolidModel, wanted="MJCF as text, or a SolidModel"),
+    grid=or_none(one_of(Grid, wanted="a Grid")),
+    gravity=VECTOR,
+    solid_density=or_none(POSITIVE),
+)
 def make_world(
     model: str | SolidModel = EMPTY,
     grid: Grid | None = None,
@@ -113,7 +120,8 @@ def make_world(
     grid           of the fluid; None for a world without fluid
     slab           whether the bodies move in the plane; that of the grid by default
     gravity        m/s^2, of a model given as text
-    solid_density  kg/m^3 of every geom of a model given as text, in place of its own
+    solid_density  kg/m^3 of every geom of a model given as text, in place of its own; a geom with a
+                   mass keeps it
     motions        prescribed motions of joints
     winds          simple winds
     fluid          its properties; the density is 1 kg/m^3 by default
@@ -128,16 +136,15 @@ def make_world(
     )
 
 
+@takes(steps=COUNT)
 def advance(
     world: World, dt: float, steps: int = 1, command: JointCommand | None = None
 ) -> StepReport:
     """Take equal steps of dt (s), in place; returns the last report.
 
     command  to joints without a trajectory
-    raises   ArithmeticError if a step fails; ValueError for fewer than one step
+    raises   ArithmeticError if a step fails; SceneError for a wrong argument
     """
-    if steps < 1:
-        raise ValueError(f"steps is {steps}: give 1 or more")
     for _ in range(steps):
         report = step(world, dt, command)
         if report.outcome is not Outcome.DONE:

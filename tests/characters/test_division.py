@@ -100,7 +100,7 @@ def test_no_crack_opens_at_a_joint_that_turns() -> None:
 def test_surface_with_a_hole_is_refused() -> None:
     vertices, faces, weights = rigged.box()
     end = Surface(vertices, faces[2:], weights / 0.8, GREY[2:])
-    said = r"box\.glb: .* watertight: 4 edges .*: 1, the widest 0\.5 m .* Close them by --fill, or"
+    said = r"box\.glb: .* watertight: 4 edges .*: 1, the widest 0\.5 m .* by fill=True, or"
     with pytest.raises(SceneError, match=said):
         divided(rig(), end, "box.glb")
     division = divided(rig(), end, "box.glb", fill=True)

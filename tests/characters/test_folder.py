@@ -94,10 +94,10 @@ def test_a_character_of_another_unit_is_told_and_scaled(tmp_path: Path) -> None:
     made = fb.import_character(tmp_path / "box.glb", tmp_path / "huge", scale=100.0)
     (said,) = (note for note in made.notes if "whale" in note)
     assert said.startswith("it is 200 m long and 2.4e+08 kg, longer than a whale")
-    assert said.endswith("with --scale 1 it is 2 m long and 240 kg")
+    assert said.endswith("with a scale of 1 it is 2 m long and 240 kg")
     mended = fb.import_character(tmp_path / "box.glb", tmp_path / "own", scale=100.0 * 0.01)
     assert not [note for note in mended.notes if "whale" in note]
-    said = r"0\.0008 m long and 1\.54e-08 kg, .*: with --scale 0\.4 it is 0\.8 m long and 15\.4 kg"
+    said = r"0\.0008 m long and 1\.54e-08 kg, .* a scale of 0\.4 it is 0\.8 m long and 15\.4 kg"
     with pytest.raises(fb.SceneError, match=said):
         fb.import_character(tmp_path / "box.glb", tmp_path / "tiny", scale=4e-4)
     fb.import_character(tmp_path / "box.glb", tmp_path / "tiny", scale=4e-4 * 1000.0)
@@ -228,7 +228,7 @@ def test_command_says_what_it_made(tmp_path: Path, capsys: pytest.CaptureFixture
 
     code, text = said()
     assert (code, text.count("\n")) == (2, 1)
-    assert "box.glb has 2 clips. Name one with --clip: Swim 0, Swim 1." in text
+    assert "box.glb has 2 clips. Name one as the clip: Swim 0, Swim 1." in text
     code, text = said("--density", "0")
     assert (code, text) == (2, "flowborne: --density is 0; give kg/m^3 above 0\n")
     code, text = said("--clip", "Swim 1")

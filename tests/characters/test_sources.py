@@ -107,7 +107,7 @@ def test_what_is_wrong_with_a_file_is_one_message(
     source = read_source(tmp_path / "box.glb")
     with pytest.raises(SceneError, match=r"has no clip 'Swin'\. It has: Swim 0, Swim 1\."):
         clip_number(source, "Swin", "box.glb")
-    with pytest.raises(SceneError, match=r"2 clips\. Name one with --clip: Swim 0, Swim 1\."):
+    with pytest.raises(SceneError, match=r"2 clips\. Name one as the clip: Swim 0, Swim 1\."):
         clip_number(source, None, "box.glb")
     assert clip_number(source, "Swim 1", "box.glb") == 1
     rigged.write_glb(tmp_path / "still.glb", clips=0)

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from flowborne.base.errors import SceneError
 from flowborne.control import executors
 from flowborne.control.executors import Foreign, Processes, Serial, Threads, mapper
 from flowborne.kernels import jit
@@ -81,9 +82,9 @@ def test_names_and_bad_names() -> None:
     assert isinstance(mapper("threads", 3), Threads)
     assert mapper("processes", 2).workers == 2  # type: ignore[attr-defined]
     assert isinstance(mapper(LikeDask()), Foreign)
-    with pytest.raises(ValueError, match="'cluster'"):
+    with pytest.raises(SceneError, match="'cluster'"):
         mapper("cluster")
-    with pytest.raises(TypeError, match="neither submit nor map"):
+    with pytest.raises(SceneError, match="neither submit nor map"):
         mapper(3)
     with pytest.raises(ValueError, match="workers is 0"):
         Threads(0)

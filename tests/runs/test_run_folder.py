@@ -32,7 +32,7 @@ def test_a_new_folder_is_made_with_its_parents_and_marked(tmp_path):
 def test_an_earlier_run_is_kept_unless_replaced(tmp_path):
     path = finished_run(tmp_path / "run").path
     before = files_in(path)
-    with pytest.raises(RunFolderError, match=r"--resume.*--replace"):
+    with pytest.raises(RunFolderError, match=r"resume=True.*replace=True"):
         RunFolder.create(path)
     assert files_in(path) == before
 

@@ -146,6 +146,19 @@ def test_what_of_the_file_has_no_effect_is_said_once(written: Written) -> None:
     )
 
 
+def test_what_overrules_a_density_of_the_scene_is_said(written: Written) -> None:
+    bone = '<geom_class="bone"_size=".1"/>'
+    for given, said in (
+        ('mass="900"', "[solids] density for geoms of hand that have a mass in the file"),
+        ('density="900"', "the density of geoms of hand, which [solids] density replaces"),
+    ):
+        geom = {bone: f'<geom class="bone" size=".1" {given}/>'}
+        scene = load_scene(written("density = 500.0\n", **geom))
+        assert said in next(notes_of(scene, build(scene).world.setup.solid))
+        scene = load_scene(written(**geom))
+        assert "[solids] density" not in next(notes_of(scene, build(scene).world.setup.solid))
+
+
 def test_what_the_file_itself_switches_off_is_said(written: Written) -> None:
     flags = {'gravity="disable"': 'gravity="disable" contact="disable" limit="disable"'}
     scene = load_scene(written(**flags))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -41,6 +41,13 @@ def test_mass_and_inertia_are_those_of_a_ring() -> None:
     np.testing.assert_allclose(model.centroid[1], PLACED.position, atol=1e-6)
     expected = model.body_mass[1] * np.array([ABOUT, ACROSS, ACROSS])
     np.testing.assert_allclose(np.sort(model.mj.body_inertia[1])[::-1], expected, rtol=3e-3)
+
+
+def test_its_density_wins_over_that_of_all_bodies() -> None:
+    for own, expected in ((10.0, 10.0), (None, 500.0)):
+        shape = replace(PLACED, density=own)
+        model = fb.SolidModel.from_string(MODEL, density=500.0, shapes=[shape])
+        assert model.body_mass[1] == pytest.approx(expected * VOLUME, rel=3e-3)
 
 
 def test_the_distance_is_its_own_wherever_the_model_puts_it() -> None:

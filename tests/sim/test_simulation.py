@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import flowborne
+from flowborne.base.errors import SceneError
 from flowborne.coupling.report import Outcome
 from flowborne.sim import simulation as module
 from flowborne.sim.simulation import BlowUpError, Simulation, default_workers
@@ -171,7 +172,7 @@ def test_kernels_of_small_grids_run_on_one_thread(small_scene, monkeypatch):
 
 
 def test_no_worker_is_refused(small_scene):
-    with pytest.raises(ValueError, match="workers is 0; give 1 or more"):
+    with pytest.raises(SceneError, match="workers is 0; give a whole number from 1"):
         Simulation(small_scene, workers=0)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from flowborne.solids.displacing import BY_RULE, Displace
@@ -82,12 +83,27 @@ def test_what_names_nothing_is_refused(displace: Displace, message: str) -> None
         displacing(DRAWN + BUMPER, displace)
 
 
-def test_a_density_is_that_of_the_geoms_that_displace() -> None:
-    geoms = "<geom size='.5' mass='0'/><geom size='.6' group='3'/>"
+SPHERE = 4.0 / 3.0 * np.pi * 0.5**3
+
+
+@pytest.mark.parametrize(
+    ("geoms", "mass"),
+    [
+        ("<geom size='.5'/>", 100.0 * SPHERE),
+        ("<geom size='.5' density='300'/>", 100.0 * SPHERE),
+        ("<geom size='.5' mass='2'/>", 2.0),
+        ("<geom size='.5'/><geom size='.6' group='3'/>", 100.0 * SPHERE),
+        ("<geom size='.5'/><geom size='.6' group='3' mass='7'/>", 100.0 * SPHERE + 7.0),
+        ("<geom size='.5' mass='0'/><geom size='.6' group='3'/>", 100.0 * 1.728 * SPHERE),
+        ("<geom size='.5' mass='0'/><geom size='.6' group='3' mass='7'/>", 7.0),
+    ],
+)
+def test_a_mass_wins_over_the_scenes_density_and_that_over_the_models(
+    geoms: str, mass: float
+) -> None:
     xml = f"<mujoco><worldbody><body><freejoint/>{geoms}</body></worldbody></mujoco>"
-    assert SolidModel.from_string(xml).body_mass[1] == pytest.approx(904.8, rel=1e-3)
     model = SolidModel.from_string(xml, density=100.0)
-    assert model.body_mass[1] == pytest.approx(100.0 * model.volume[1])
+    assert model.body_mass[1] == pytest.approx(mass, rel=1e-6)
 
 
 def test_groups_without_inertia_stay_without() -> None:

@@ -197,13 +197,6 @@ def test_contact_geoms_displace_nothing() -> None:
     assert model.volume[1] == pytest.approx(np.pi / 6, rel=1e-12)
 
 
-def test_density_overrides_every_geom() -> None:
-    body = "<body><freejoint/><geom size='.5' mass='3'/></body>"
-    xml = f"<mujoco><worldbody>{body}</worldbody></mujoco>"
-    model = SolidModel.from_string(xml, density=10.0)
-    assert model.body_mass[1] == pytest.approx(10 * np.pi / 6, rel=1e-12)
-
-
 def test_names_ranges_and_dofs() -> None:
     model = SolidModel.from_string(
         """<mujoco><worldbody><body name="a"><freejoint name="root"/><geom size=".1"/>

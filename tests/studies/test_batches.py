@@ -160,8 +160,8 @@ def test_wrong_folders_are_refused_before_anything_is_written(clips, small_scene
     empty = clips.parent / "empty"
     empty.mkdir()
     for folder, said in (
-        (clips.parent / "nowhere", "there is no folder .*nowhere; give --clips a folder"),
-        (clips / "b.bvh", "b.bvh is a file; give --clips a folder"),
+        (clips.parent / "nowhere", "there is no folder .*nowhere; give a folder"),
+        (clips / "b.bvh", "b.bvh is a file; give a folder"),
         (empty, "empty has nothing and no BVH file"),
         (clips / "more", "more has nothing and no BVH file"),
     ):
@@ -171,7 +171,7 @@ def test_wrong_folders_are_refused_before_anything_is_written(clips, small_scene
         run_clips(small_scene, clips, out)
     with pytest.raises(flowborne.SceneError, match="unknown key 'colour'"):
         run_clips(SCENE, clips, out, overrides={"human.colour": "1"})
-    with pytest.raises(RunFolderError, match="workers is 0; give 1 or more"):
+    with pytest.raises(flowborne.SceneError, match="workers is 0; give a whole number from 1"):
         run_clips(SCENE, clips, out, workers=0)
     (clips / "captured.bvh").write_text("")
     with pytest.raises(

@@ -77,7 +77,7 @@ def test_a_folder_without_frames_says_so(write_run: Write) -> None:
     folder = write_run(frames=1)
     for path in (folder / "states").iterdir():
         path.unlink()
-    with pytest.raises(RunFolderError, match="has no frame yet; continue the run with --resume"):
+    with pytest.raises(RunFolderError, match="has no frame yet; continue the run with resume=True"):
         make_preview(folder)
 
 

@@ -157,7 +157,7 @@ def closed(surface: Surface, name: str, fill: bool = False) -> tuple[Surface, tu
     if wide and not fill:
         widest = max(wide, key=lambda n: across[n])
         x, y, z = points[loops[widest]].mean(axis=0)
-        remedy = "Close them by --fill, or" if volume_of((every, whole)) > 0.0 else "Close them"
+        remedy = "Close them by fill=True, or" if volume_of((every, whole)) > 0.0 else "Close them"
         raise SceneError(
             f"{name}: the surface is not watertight: {len(rims)} edges have a triangle on one side "
             f"only. Holes wider than {SMALL_HOLE:.0%} of it: {len(wide)}, the widest "

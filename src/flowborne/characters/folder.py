@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import tomli_w
 
+from flowborne.base.arguments import NUMBER, PATH, TEXT, or_none, takes
 from flowborne.base.errors import SceneError
 from flowborne.characters.division import Division, divided
 from flowborne.characters.limits import check_work
@@ -59,6 +60,9 @@ class Imported:
     notes: tuple[str, ...]
 
 
+@takes(
+    file=PATH, out=PATH, clip=or_none(TEXT), animations=or_none(PATH), density=NUMBER, scale=NUMBER
+)
 def import_character(
     file: str | Path,
     out: str | Path,

@@ -134,7 +134,7 @@ def size_notes(vertices: Array, mass: float, scale: float, name: str) -> Iterato
     length = float(np.ptp(vertices, axis=0).max())
     more = 10.0 ** round(-math.log10(length))
     resized = (
-        f"with --scale {more * scale:g} it is {more * length:.3g} m long and "
+        f"with a scale of {more * scale:g} it is {more * length:.3g} m long and "
         f"{more**3 * mass:.3g} kg"
     )
     size = f"{length:.3g} m long and {mass:.3g} kg"

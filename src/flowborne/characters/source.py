@@ -81,12 +81,11 @@ def clip_number(source: Source, clip: str | None, name: str) -> int:
     """
     if not source.clips:
         raise SceneError(
-            f"{name} has no clip. Name a file with clips for the same joint names with "
-            "--animations."
+            f"{name} has no clip. Name a file with clips for the same joints as its animations."
         )
     if clip is None and len(source.clips) > 1:
         raise SceneError(
-            f"{name} has {len(source.clips)} clips. Name one with --clip: "
+            f"{name} has {len(source.clips)} clips. Name one as the clip: "
             f"{', '.join(source.clips)}."
         )
     if clip is not None and clip not in source.clips:

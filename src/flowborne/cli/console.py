@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from typing import TYPE_CHECKING
 
@@ -59,7 +60,9 @@ def sentence_of(error: Exception) -> str:
 
 
 def complain(message: str) -> None:
-    """Say what is wrong in one line that can be read, whatever the input has put into it."""
+    """Say what is wrong in one line that can be read, whatever the input has put into it, with the
+    switches of Python as options."""
+    message = re.sub(r"\b(fill|replace|resume|trust)=True\b", r"--\1", message)
     line = "".join(c if c.isprintable() else repr(c)[1:-1] for c in message)
     if len(line) > LONGEST:
         line = f"{line[: LONGEST // 2]} ... {line[-LONGEST // 2 :]}"

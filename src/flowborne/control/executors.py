@@ -19,7 +19,7 @@ from concurrent.futures.process import BrokenProcessPool
 from functools import partial
 from typing import Any, Protocol, TypeVar
 
-from flowborne.base.errors import WorkerError
+from flowborne.base.errors import SceneError, WorkerError
 from flowborne.kernels.jit import allowed_threads, cores, kernel_threads
 
 Task = TypeVar("Task")
@@ -125,12 +125,12 @@ class Foreign(Mapper):
     For example an executor of `concurrent.futures` or mpi4py, or a client of `dask.distributed`;
     its owner closes it.
 
-    raises  TypeError if the object has neither
+    raises  SceneError if the object has neither
     """
 
     def __init__(self, executor: Any) -> None:
         if not (hasattr(executor, "submit") or hasattr(executor, "map")):
-            raise TypeError(
+            raise SceneError(
                 f"executor {executor!r} has neither submit nor map: give 'serial', 'threads', "
                 "'processes' or an object like concurrent.futures.Executor"
             )
@@ -153,7 +153,7 @@ def mapper(executor: str | object = "threads", workers: int | None = None) -> Ma
 
     executor  "serial", "threads", "processes", or an object with `submit` or `map`
     workers   for threads and processes; None is one per core
-    raises    ValueError for another name, TypeError for another object
+    raises    SceneError for another name or object
     """
     if not isinstance(executor, str):
         return Foreign(executor)
@@ -163,7 +163,7 @@ def mapper(executor: str | object = "threads", workers: int | None = None) -> Ma
         return Threads(workers)
     if executor == "processes":
         return Processes(workers)
-    raise ValueError(
+    raise SceneError(
         f"executor is {executor!r}: give 'serial', 'threads', 'processes' or an executor object"
     )
 

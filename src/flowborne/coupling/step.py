@@ -32,6 +32,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from flowborne.base.arguments import POSITIVE, one_of, or_none, takes
 from flowborne.coupling.bodies_step import (
     activate,
     equations,
@@ -60,6 +61,11 @@ from flowborne.kernels.faces import is_finite
 from flowborne.solids.trajectories import JointCommand
 
 
+@takes(
+    world=one_of(World, wanted="a World"),
+    dt=POSITIVE,
+    command=or_none(one_of(JointCommand, wanted="a JointCommand")),
+)
 def step(world: World, dt: float, command: JointCommand | None = None) -> StepReport:
     """Advance `world` by dt, in place (section 6), in as many equal parts as `parts_of` asks for.
 

@@ -9,9 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import map_coordinates
 
+from flowborne.base.errors import SceneError
 from flowborne.base.one_line import one_line
 from flowborne.coupling.cut import cut_by_bodies
-from flowborne.coupling.world import World
+from flowborne.coupling.world import Fluid, World
 from flowborne.fluid.grid import Grid
 from flowborne.kernels.arrays import Array, Faces
 from flowborne.solids.dynamics import Kinematics
@@ -91,11 +92,28 @@ class FlowState:
     pressure: Array
 
 
+def _within(fluid: Fluid, x: Array) -> Array:
+    """Points x (n, 3) in the domain; across periodic sides their images. Raises as `flow_at`."""
+    low, high = np.array(fluid.grid.origin), np.array(fluid.grid.upper)
+    out = (x < low) | (x > high)
+    out[:, [axis for axis in range(3) if axis not in fluid.grid.axes]] = False
+    lost = np.argwhere(out & ~np.array(fluid.boundaries.periodic()))
+    if lost.size:
+        n, axis = lost[0]
+        raise SceneError(
+            f"point {n + 1} of {len(x)} is at {'xyz'[axis]} = {x[n, axis]:.4g} m, outside the "
+            f"domain from {low[axis]:.4g} to {high[axis]:.4g} m; give points within"
+        )
+    return np.where(out, low + (x - low) % (high - low), x)
+
+
 def flow_at(world: World, x: Array) -> FlowState:
     """The fluid at points x (n, 3), linear between faces and between the centres of cells that hold
-    fluid; beyond the domain that at its side. Raises ValueError without a fluid."""
+    fluid. Raises ValueError without a fluid, SceneError for a point outside the domain, unless the
+    side there is periodic."""
     fluid, state = world.flow()
     grid = fluid.grid
+    x = _within(fluid, x)
     at = ((x - np.array(grid.origin)) / grid.spacing - 0.5).T
     if grid.is_slab:
         at[2] = 0.0

@@ -9,6 +9,19 @@ from typing import Any
 
 import numpy as np
 
+from flowborne.base.arguments import (
+    NOT_NEGATIVE,
+    PART,
+    POSITIVE,
+    TEXT,
+    VECTOR,
+    check,
+    having,
+    one_of,
+    or_none,
+    several,
+    takes,
+)
 from flowborne.base.one_line import one_line
 from flowborne.coupling.band import Band, Projection
 from flowborne.coupling.fractions import Geometry
@@ -50,7 +63,8 @@ class Fluid:
     tolerance     relative residual of the pressure solve
     one_way       whether the bodies do not act on the fluid, which acts on them as a wind alone
     window        how the grid follows bodies; None if it stays where it is
-    raises        ValueError when the grid is to move across sides beyond which there is no fluid
+    raises        ValueError when the grid is to move across sides beyond which there is no fluid,
+                  SceneError for a property of another kind
     """
 
     __repr__ = one_line
@@ -67,6 +81,16 @@ class Fluid:
     window: Window | None = None
 
     def __post_init__(self) -> None:
+        check(
+            self,
+            grid=one_of(Grid, wanted="a Grid"),
+            density=POSITIVE,
+            viscosity=NOT_NEGATIVE,
+            boundaries=one_of(Boundaries, wanted="Boundaries"),
+            scalars=several(TEXT, "names of dyes"),
+            body_force=VECTOR,
+            tolerance=PART,
+        )
         for axis in () if self.window is None else self.window.axes:
             for side in self.boundaries.pair(axis):
                 if not crosses(side):
@@ -93,6 +117,7 @@ class Setup:
     splits   whether the added-mass part of the fluid's force, which costs a solve, is split off in
              each step; else when its report is asked for it, and the matrix is then made again
     basis    a setup of the same bodies on the same grid, whose shapes are those of this one
+    raises   SceneError for parts of another kind
     """
 
     __repr__ = one_line
@@ -108,6 +133,16 @@ class Setup:
     balances: bool = True
     splits: bool = False
     basis: Setup | None = None
+
+    def __post_init__(self) -> None:
+        check(
+            self,
+            solid=one_of(SolidModel, wanted="a SolidModel"),
+            fluid=or_none(one_of(Fluid, wanted="a Fluid")),
+            motions=several(having("position"), "motions"),
+            winds=several(having("wrench"), "winds"),
+            forces=several(having("wrench"), "forces"),
+        )
 
     @property
     def hypothetical(self) -> Setup:
@@ -201,6 +236,7 @@ class World:
         return vars(self) | kept | {"splitting": ()}
 
     @classmethod
+    @takes(setup=one_of(Setup, wanted="a Setup"))
     def at_rest(cls, setup: Setup) -> World:
         """World of `setup` in its model's rest pose, in still fluid."""
         fluid, state = setup.fluid, None

@@ -7,9 +7,23 @@ from functools import cached_property
 
 import numpy as np
 
+from flowborne.base.arguments import (
+    AXIS,
+    COUNT,
+    INDEX,
+    NUMBER,
+    POSITIVE,
+    VECTOR,
+    check,
+    several,
+    takes,
+)
 from flowborne.kernels.arrays import Array as Array
 from flowborne.kernels.arrays import Faces as Faces
 from flowborne.kernels.arrays import Marks, Mask, Nodes
+
+CELLS = several(COUNT, "3 whole numbers of 1 or more", 3)
+"""Numbers of cells along x, y and z."""
 
 
 def faces_of(values: list[Array]) -> Faces:
@@ -43,20 +57,26 @@ class Grid:
     shape    (nx, ny, nz) cells
     spacing  h, edge of a cell in m
     origin   (x, y, z) of the lower corner in m
+    raises   SceneError for other numbers
     """
 
     shape: tuple[int, int, int]
     spacing: float
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
+    def __post_init__(self) -> None:
+        check(self, shape=CELLS, spacing=POSITIVE, origin=VECTOR)
+
     def __str__(self) -> str:
         return " x ".join(str(self.shape[axis]) for axis in self.axes) + " cells"
 
     @classmethod
+    @takes(origin=several(NUMBER, "2 finite numbers", 2))
     def slab(cls, nx: int, ny: int, spacing: float, origin: tuple[float, float]) -> Grid:
         """Two-dimensional grid of nx by ny cells with its lower left corner at `origin`."""
         return cls((nx, ny, 1), spacing, (*origin, -0.5 * spacing))
 
+    @takes(axis=AXIS, cells=INDEX)
     def moved(self, axis: int, cells: int) -> Grid:
         """The same grid some cells further along an axis."""
         origin = list(self.origin)

@@ -35,7 +35,7 @@ class ExporterBvh:
 
     def write(self, run: StoredRun, path: Path) -> Written | None:
         if len(run) < 2:
-            raise SceneError(f"{run.folder} has no motion yet. Continue the run with --resume.")
+            raise SceneError(f"{run.folder} has no motion yet. Continue the run with resume=True.")
         if "clip" in run.tables:
             return Written((path,), export_bvh(run.folder, path))
         creature = Creature(run)

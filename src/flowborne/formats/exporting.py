@@ -6,12 +6,14 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from flowborne.base.arguments import PARAMETERS, PATH, or_none, takes
 from flowborne.base.errors import PartError, SceneError
 from flowborne.runs.exporters import EXPORTERS, Written, can_write, endings
 from flowborne.runs.run_folder import RunFolder, RunFolderError
 from flowborne.view.open_run import OpenRun
 
 
+@takes(run=PATH, out=PATH, parameters=or_none(PARAMETERS))
 def export(
     run: str | Path, out: str | Path, parameters: Mapping[str, Any] | None = None
 ) -> Written:

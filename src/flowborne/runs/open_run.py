@@ -11,8 +11,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from flowborne.base.arguments import INDEX, PATH, TEXT, read, takes
+from flowborne.base.errors import SceneError
 from flowborne.base.extras import optional
 from flowborne.base.given import read_json
+from flowborne.base.phrases import suggestion
 from flowborne.fluid.grid import Grid
 from flowborne.kernels.arrays import Array, Integers
 from flowborne.runs.history import HistoryColumns, history_arrays, history_columns, read_history
@@ -29,6 +32,7 @@ class StoredRun:
     raises  RunFolderError when it is not the folder of a run, or has no state yet
     """
 
+    @takes(folder=PATH)
     def __init__(self, folder: str | Path) -> None:
         files = RunFolder.existing(Path(folder))
         self.folder = files.path
@@ -43,7 +47,7 @@ class StoredRun:
             self.grid = _grid(self._model["grid"])
             self._states = tuple(files.state_files())
         if not self._states:
-            raise RunFolderError(f"{folder} has no frame yet; continue the run with --resume")
+            raise RunFolderError(f"{folder} has no frame yet; continue the run with resume=True")
         self.frames: Sequence[int] = tuple(int(path.stem) for path in self._states)
 
     def __len__(self) -> int:
@@ -84,11 +88,14 @@ class StoredRun:
 
     def state(self, number: int) -> dict[str, NDArray[Any]]:
         """Arrays of a state by name, in single precision; negative numbers count from the end.
+        Raises SceneError for a number without a state.
 
         time, q, v, body_position (nb, 3), body_rotation (nb, 3, 3), geom_position, geom_rotation,
         fluid_force (nb, 3), flesh_vertices (k, 3); with a fluid, velocity_x, velocity_y, velocity_z
         on the faces, pressure, scalar_<dye>, and open, the part of each cell outside all bodies.
         """
+        if not -len(self) <= read(INDEX, number, "number") < len(self):
+            raise SceneError(f"{self.folder} has no state {number}; give 0 to {len(self) - 1}")
         return read_state(self._states[number])
 
     def grid_at(self, state: Arrays) -> Grid:
@@ -119,11 +126,15 @@ class StoredRun:
             return self.every("grid_origin")
         return np.broadcast_to(self.grid_at({}).origin, (len(self), 3))
 
+    @takes(name=TEXT)
     def every(self, name: str) -> Array:
         """(n, ...) one array of all states, such as "body_position".
 
         raises  KeyError when the states have no such array
         """
+        if name not in self.arrays:
+            end = suggestion(name, self.arrays, "They have")
+            raise KeyError(f"the states have no '{name}'{end}")
         return np.asarray(self.arrays[name], float)
 
     def dataset(self) -> xarray.Dataset:

@@ -127,7 +127,7 @@ class RunFolder:
         except Timeout:
             raise RunFolderError(
                 f"another run is being written into {self.path}; wait for its end, or name "
-                "another folder with --out"
+                "another folder"
             ) from None
         except OSError as error:
             raise cannot_write(self.path, error) from error
@@ -157,7 +157,7 @@ class RunFolder:
                 if (found := Path(place) / name).is_symlink():
                     raise RunFolderError(
                         f"{found} is a symbolic link, and a run writes and removes nothing behind "
-                        "one; remove the link, or name another folder with --out"
+                        "one; remove the link, or name another folder"
                     )
 
     def check_new(self, *, replace: bool) -> None:
@@ -165,26 +165,25 @@ class RunFolder:
         path = self.path
         check_name(path)
         if path.exists() and not path.is_dir():
-            raise RunFolderError(f"{path} is a file; name a folder with --out")
+            raise RunFolderError(f"{path} is a file; name a folder")
         if not path.exists():
             above = next(parent for parent in path.absolute().parents if parent.exists())
             if not above.is_dir() or not os.access(above, os.W_OK | os.X_OK):
                 raise RunFolderError(
-                    f"{path} cannot be made, because {above} cannot be written; "
-                    "name another folder with --out"
+                    f"{path} cannot be made, because {above} cannot be written; name another folder"
                 )
             return
         if not os.access(path, os.W_OK | os.X_OK):
-            raise RunFolderError(f"{path} cannot be written; name another folder with --out")
+            raise RunFolderError(f"{path} cannot be written; name another folder")
         if self.is_run():
             if not replace:
                 raise RunFolderError(
-                    f"{path} holds an earlier run; continue it with --resume, start it again "
-                    "with --replace, or name another folder with --out"
+                    f"{path} holds an earlier run; continue it with resume=True, start it "
+                    "again with replace=True, or name another folder"
                 )
         elif not self._is_empty():
             raise RunFolderError(
-                f"{path} is not empty and was not made by a run; name another folder with --out"
+                f"{path} is not empty and was not made by a run; name another folder"
             )
         self.check_links()
 
@@ -304,7 +303,8 @@ def reading(folder: Path) -> Iterator[None]:
         first = error.problems[0] if isinstance(error, SceneError) else str(error)
         said = f"it lacks {first}" if isinstance(error, KeyError) else first.rstrip(".")
         raise RunFolderError(
-            f"the files of run {folder} cannot be read ({said}); start the run again with --replace"
+            f"the files of run {folder} cannot be read ({said}); start the run again with "
+            "replace=True"
         ) from error
 
 
@@ -327,9 +327,7 @@ def check_name(path: Path) -> None:
 
 def cannot_write(path: Path, error: OSError) -> RunFolderError:
     """The error to raise when the system refuses to write into `path`."""
-    return RunFolderError(
-        f"{path} cannot be written ({error.strerror}); name another folder with --out"
-    )
+    return RunFolderError(f"{path} cannot be written ({error.strerror}); name another folder")
 
 
 def make_folder(path: Path) -> None:
@@ -339,7 +337,7 @@ def make_folder(path: Path) -> None:
     except OSError as error:
         raise cannot_write(path, error) from error
     if not os.access(path, os.W_OK | os.X_OK):
-        raise RunFolderError(f"{path} cannot be written; name another folder with --out")
+        raise RunFolderError(f"{path} cannot be written; name another folder")
 
 
 def check_space(path: Path, needed: int) -> None:
@@ -351,5 +349,5 @@ def check_space(path: Path, needed: int) -> None:
     if free < needed:
         raise RunFolderError(
             f"the run needs about {needed / 1e6:.0f} MB in {path} and {free / 1e6:.0f} MB are "
-            "free; make room, run fewer frames (--frames), or name another folder with --out"
+            "free; make room, run fewer frames, or name another folder"
         )

@@ -13,6 +13,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from flowborne.base.arguments import PATH, TEXTS, Kind, or_none, read, takes
 from flowborne.base.errors import SceneError
 from flowborne.base.given import BACKSLASH, read_file
 from flowborne.base.phrases import suggestion
@@ -25,6 +26,8 @@ from flowborne.scenes.draft import Draft, explain, keys_of
 from flowborne.scenes.keyframe_file import inline_keyframes
 from flowborne.scenes.plugins import load_plugins
 from flowborne.scenes.schema import Scene
+
+SCENE = Kind(PATH.read, "a Scene, the name of a built-in one, or the path of a scene file")
 
 
 def join_elbows(raw: dict[str, Any]) -> None:
@@ -102,6 +105,7 @@ def scene_names() -> tuple[str, ...]:
     return BUILT_IN
 
 
+@takes(name_or_path=SCENE, overrides=or_none(TEXTS))
 def load_scene(
     name_or_path: str | Path, overrides: Mapping[str, str] | None = None, *, trust: bool = True
 ) -> Scene:
@@ -121,7 +125,7 @@ def load_scene(
     if not trust and path.parent != library() and (named := python_of(raw)):
         raise SceneError(
             f"scene {path.name} brings Python, which can do whatever you can: {', '.join(named)}. "
-            "Read it, then check with --trust, which imports it as a run does."
+            "Read it, then check with trust=True, which imports it as a run does."
         )
     draft, problems = _understood(raw, path)
     if draft is None:
@@ -135,6 +139,11 @@ def load_scene(
     if problems:
         raise SceneError(problems)
     return with_steps(draft.scene)
+
+
+def scene_of(scene: Scene | str | Path) -> Scene:
+    """A scene, loaded if it is a name or a path. Raises SceneError as `load_scene`."""
+    return scene if isinstance(scene, Scene) else load_scene(read(SCENE, scene, "scene"))
 
 
 def read_scene(path: Path) -> Scene:
@@ -265,7 +274,7 @@ def override(raw: dict[str, Any], key: str, text: str) -> None:
     Missing tables are added; the schema finds unknown keys.
     raises  SceneError for a key that leads nowhere
     """
-    put(raw, key, value_of(text), f"--set {key}={text}")
+    put(raw, key, value_of(text), f"{key}={text}")
 
 
 def put(raw: dict[str, Any], key: str, wanted: Any, said: str) -> None:

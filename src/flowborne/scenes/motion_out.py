@@ -47,7 +47,7 @@ def export_bvh(run: Path, path: Path) -> str:
         )
     states = sorted(p for p in folder.states.iterdir() if STATE_NAME.fullmatch(p.name))
     if len(states) < 2:
-        raise SceneError(f"{run} has no motion yet. Continue the run with --resume.")
+        raise SceneError(f"{run} has no motion yet. Continue the run with resume=True.")
     times, q = poses_of(states)
     model = load_model(scene)
     if scene.clip.file is None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import mujoco
 import numpy as np
 
 from flowborne.base.phrases import listed
@@ -20,6 +21,7 @@ from flowborne.motion.clip_reading import (
 from flowborne.motion.human.clip_skeleton import lost_bones
 from flowborne.motion.human.skeleton import PARENTS
 from flowborne.scenes.bodies import (
+    given_of,
     held_joints,
     left_free,
     own_pose,
@@ -31,7 +33,6 @@ from flowborne.scenes.capture import capture_of
 from flowborne.scenes.dye import DyeBox
 from flowborne.scenes.earlier import earlier_of
 from flowborne.scenes.schema import Scene
-from flowborne.scenes.schema_bodies import SolidsTable
 from flowborne.solids.actuators import actuator_servos
 from flowborne.solids.geoms import floors
 from flowborne.solids.mending import joined_pairs, mended_meshes
@@ -125,7 +126,7 @@ def _standing_still(scene: Scene) -> Iterator[str]:
     if earlier is not None and earlier.length < run - 0.5 * scene.frame_time:
         yield (
             f"[earlier]: that run is {earlier.length:.3g} s long and this one {run:.3g} s; its "
-            "joints stand still from there. It goes on with --resume and --frames"
+            "joints stand still from there. It goes on when it is resumed with more frames"
         )
     table, capture = scene.clip, capture_of(scene)
     if table is None or capture is None or table.file is None or table.loop:
@@ -166,7 +167,7 @@ def _model_file(scene: Scene, model: SolidModel) -> Iterator[str]:
     spec, step = spec_of(scene), scene.frame_time / scene.time.steps_per_frame
     name, on_floors = scene.model_path.name, bool(floors(model.mj))
     options = replaced_options(spec, scene.gravity, step, on_floors)
-    unused = [*options, *_elements(scene, spec, model), *_densities(scene.solids, spec)]
+    unused = [*options, *_elements(scene, spec, model), *_densities(scene, spec)]
     if unused:
         yield f"[solids]: of {name} these have no effect: {'; '.join(unused)}"
     if off := disabled_parts(spec):
@@ -198,17 +199,27 @@ def _elements(scene: Scene, spec: MjSpec, model: SolidModel) -> Iterator[str]:
         yield f"delay and interval of sensors {listed(late)}, which are read at each frame's end"
 
 
-def _densities(given: SolidsTable, spec: MjSpec) -> Iterator[str]:
-    """Densities of the scene for bodies that have their own inertia in the file."""
-    own = [
-        name
-        for name in bodies_with_own_inertia(spec)
-        if given.densities.get(name, given.density) is not None
-    ]
+def _densities(scene: Scene, spec: MjSpec) -> Iterator[str]:
+    """Densities of the scene that an inertia or a mass in the file overrules, and densities of the
+    file that the scene's replace."""
+    given, default = given_of(scene), mujoco.MjSpec().default.geom.density
+    dense = {b.name for b in spec.bodies[1:] if given.density_of(b.name) is not None}
+    own = [name for name in bodies_with_own_inertia(spec) if name in dense]
     if own:
         yield (
             f"[solids] density for {listed(own)}, whose <inertial> in the file says what they weigh"
         )
+    others = [g for g in spec.geoms if g.parent.name in dense - {*own}]
+    heavy = dict.fromkeys(g.parent.name for g in others if not np.isnan(g.mass))
+    if heavy:
+        yield (
+            f"[solids] density for geoms of {listed([*heavy])} that have a mass in the file, which "
+            "wins over any density"
+        )
+    lost = [g for g in others if np.isnan(g.mass) and g.density != default]
+    replaced = dict.fromkeys(g.parent.name for g in lost)
+    if replaced:
+        yield f"the density of geoms of {listed([*replaced])}, which [solids] density replaces"
 
 
 def clip_notes(scene: Scene) -> Iterator[str]:

@@ -153,7 +153,7 @@ def scene_to_resume(folder: RunFolder, wanted: Scene) -> Scene:
     if not folder.scene.exists():
         raise RunFolderError(
             f"{folder.path} has no scene.toml: the run was stopped before it began; "
-            "start it again with --replace"
+            "start it again with replace=True"
         )
     with reading(folder.path):
         saved = load_scene(folder.scene)
@@ -171,7 +171,7 @@ def scene_to_resume(folder: RunFolder, wanted: Scene) -> Scene:
     raise RunFolderError(
         f"{folder.path} holds a run of another scene ({'; '.join(differing[:3])}); "
         f"continue that one (flowborne run {folder.scene} --out {folder.path} --resume), or "
-        "name another folder with --out"
+        "name another folder"
     )
 
 

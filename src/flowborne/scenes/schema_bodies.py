@@ -58,7 +58,8 @@ class SolidsTable(Table):
     """[solids]: the bodies.
 
     model      MJCF or URDF file, found from the folder of the scene file
-    density    kg/m^3 of every body; replaces the model's densities
+    density    kg/m^3 of every body; replaces the model's densities, and not the mass of a geom or
+               body that has one in the model
     densities  body -> kg/m^3 of that body; replaces the model's density and `density`
     floating   bodies that hang on the world without a joint, such as the root of a URDF: each gets
                a free joint of its own name

@@ -37,6 +37,15 @@ from flowborne.scenes.warn_bodies import (
 from flowborne.scenes.warn_speed import fast_bodies, fast_flow, unlike_the_sea
 from flowborne.scenes.warn_stops import past_stops, soft_stops
 from flowborne.scenes.warn_trim import counted_twice, pinned_under_lid
+from flowborne.scenes.warn_units import (
+    densities_alone,
+    gravity,
+    inertias,
+    ranges,
+    sizes,
+    slow_steps,
+    winds,
+)
 from flowborne.solids.model import SLIDE, joint_kind, joint_unit
 
 LEAST_STRENGTH = 2.0 * math.pi
@@ -152,6 +161,11 @@ Warn = Callable[[Scene, Setup], Iterator[str]]
 """Warnings of one kind about a scene and what was built of it."""
 
 WARNINGS: tuple[Warn, ...] = (
+    sizes,
+    gravity,
+    winds,
+    densities_alone,
+    inertias,
     leaking_bodies,
     thin_bodies,
     lost_in_domain,
@@ -165,6 +179,8 @@ WARNINGS: tuple[Warn, ...] = (
     fixed_outside,
     fast_bodies,
     fast_flow,
+    slow_steps,
+    ranges,
     angles_in_radians,
     too_slow,
     limp_joints,

@@ -147,7 +147,7 @@ def implausible_density(scene: Scene, setup: Setup) -> Iterator[str]:
     rho = setup.fluid.density
     gas = is_gas(setup.fluid)
     most = DENSEST if gas else HEAVY * rho
-    found = [*_bones(setup.solid), *((table.name, table.density) for table in scene.flesh)]
+    found = [*mean_densities(setup.solid), *((table.name, table.density) for table in scene.flesh)]
     light = sorted((body for body in found if body[1] < LIGHT * rho), key=lambda body: body[1])
     heavy = sorted((body for body in found if body[1] > most), key=lambda body: -body[1])
     for bodies, factor, bound in (
@@ -189,7 +189,7 @@ def mass_apart(scene: Scene, setup: Setup) -> Iterator[str]:
     )
 
 
-def _bones(model: SolidModel) -> Iterator[tuple[str, float]]:
+def mean_densities(model: SolidModel) -> Iterator[tuple[str, float]]:
     """Name and mean density, kg/m^3, of every body that moves and that no flesh covers in part."""
     covered = np.zeros(model.nbody, bool)
     covered[model.geom_body[model.geom_covered]] = True

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from flowborne.base.one_line import one_line
+from flowborne.base.phrases import listed
 from flowborne.coupling.report import StepReport
 from flowborne.coupling.world import World
 from flowborne.kernels.arrays import Array
@@ -106,9 +107,26 @@ class Snapshot:
     report: FrameReport | None
     kept: Sensed | None = None
 
+    def unlike(self, other: Snapshot) -> str:
+        """Why one cannot go on as the other, in words; "" where it can."""
+        own, wanted = _made_of(self.world), _made_of(other.world)
+        unlike = (key for key in own if own[key] != wanted[key])
+        return next((f"its {key} are {own[key]}, not {wanted[key]}" for key in unlike), "")
+
     @cached_property
     def sensed(self) -> Sensed:
         """Bodies and joints by their names."""
         if self.report is not None:
             return self.report.sensed(self.world)
         return self.kept or Sensed.before_steps(self.world.setup.solid, self.world.solid.q)
+
+
+def _made_of(world: World) -> dict[str, str]:
+    """What all states of a scene have in common, in words."""
+    model, fluid = world.setup.solid, world.setup.fluid
+    names = {"joints": model.joint_names, "bodies": model.body_names[1:]}
+    found = {key: listed(known) or "none" for key, known in names.items()}
+    if fluid is None:
+        return found | {"cells": "none", "dyes": "none"}
+    cells = f"{' x '.join(map(str, fluid.grid.shape))} of {fluid.grid.spacing:.6g} m"
+    return found | {"cells": cells, "dyes": listed(fluid.scalars) or "none"}

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from flowborne.base.arguments import COUNT, PATH, PROGRESS, or_none, takes
 from flowborne.base.errors import PartError, SceneError, WorkerError
 from flowborne.base.extras import missing_to_draw
 from flowborne.base.progress import Progress, RunProgress, Stage, displayed
@@ -102,6 +103,7 @@ class RunInterrupted(KeyboardInterrupt):
         self.result = result
 
 
+@takes(out=PATH, frames=or_none(COUNT), workers=or_none(COUNT), progress=or_none(PROGRESS))
 def run(
     scene: Scene | str | Path,
     out: str | Path,
@@ -124,20 +126,17 @@ def run(
     film      draw preview.png and preview.mp4 at the end
     progress  called with the progress of the run; True shows it as the command line does
     returns   the result, also of a run that blew up or filled the disc: see its outcome
-    raises    RunFolderError if `out` or the arguments are wrong or another run is being written
-              there, SceneError if the scene is wrong or does not fit into memory; nothing is then
-              written. RunInterrupted (a KeyboardInterrupt) after Ctrl-C or SIGTERM, when everything
-              has been saved; KeyboardInterrupt if there was nothing to save yet
+    raises    RunFolderError if `out` cannot be used or another run is being written there,
+              SceneError if the scene or an argument is wrong, or it does not fit into memory;
+              nothing is then written. RunInterrupted (a KeyboardInterrupt) after Ctrl-C or SIGTERM,
+              when everything has been saved; KeyboardInterrupt if there was nothing to save yet
     """
-    from flowborne.scenes.load import load_scene
+    from flowborne.scenes.load import scene_of
     from flowborne.scenes.save import scene_files
 
     if resume and replace:
-        raise RunFolderError("--resume and --replace exclude each other; give one of them")
-    for name, count in (("frames", frames), ("workers", workers)):
-        if count is not None and count < 1:
-            raise RunFolderError(f"{name} is {count}; give 1 or more")
-    wanted = load_scene(scene) if isinstance(scene, str | Path) else scene
+        raise RunFolderError("resume=True and replace=True exclude each other; give one of them")
+    wanted = scene_of(scene)
     folder = RunFolder.existing(Path(out)) if resume else RunFolder(Path(out))
     if resume:
         folder.check_writable()
@@ -219,7 +218,7 @@ class _Run:
             if simulation.frame > self.frames:
                 raise RunFolderError(
                     f"{folder.path} has {simulation.frame} frames already; ask for more of them, "
-                    "or start again with --replace"
+                    "or start again with replace=True"
                 )
             self._check_space(freed=0)
             check_states(folder, simulation.frame)
@@ -231,7 +230,7 @@ class _Run:
             folder.drop_states_after(simulation.frame)
         except (OSError, ValueError) as error:
             raise RunFolderError(
-                f"{folder.path} cannot be resumed: {error}; start again with --replace"
+                f"{folder.path} cannot be resumed: {error}; start again with replace=True"
             ) from error
 
     def go_on(self) -> tuple[RunOutcome, str]:

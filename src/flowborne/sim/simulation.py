@@ -14,6 +14,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from threadpoolctl import ThreadpoolController
 
+from flowborne.base.arguments import (
+    COUNT,
+    NOT_NEGATIVE,
+    TEXT,
+    VALUES,
+    numbers,
+    one_of,
+    or_none,
+    several,
+    takes,
+)
 from flowborne.base.errors import PartError, SceneError, described
 from flowborne.base.phrases import suggestion
 from flowborne.control.commands import Commands, Drives, drives_of, told_by
@@ -78,8 +89,7 @@ class Simulation:
     workers   number of trials of the controller that run at once; by default that of the trials,
               at most that of the cores. Results do not depend on it
     executor  "serial", "threads" (default), "processes", or an object with submit() or map()
-    raises    SceneError if the scene is wrong or does not fit into memory; ValueError for
-              workers < 1
+    raises    SceneError if the scene or another argument is wrong, or it does not fit into memory
 
     scene            the Scene
     controller       the Controller, or None
@@ -89,6 +99,7 @@ class Simulation:
     columns          of the history
     """
 
+    @takes(workers=or_none(COUNT))
     def __init__(
         self,
         scene: Scene | str | Path,
@@ -98,11 +109,9 @@ class Simulation:
         from flowborne.control.executors import mapper
         from flowborne.coupling.step import step
         from flowborne.scenes.build import build
-        from flowborne.scenes.load import load_scene
+        from flowborne.scenes.load import scene_of
 
-        if workers is not None and workers < 1:
-            raise ValueError(f"workers is {workers}; give 1 or more")
-        self.scene: Scene = load_scene(scene) if isinstance(scene, str | Path) else scene
+        self.scene: Scene = scene_of(scene)
         count = workers or default_workers(
             len(self.scene.controlled_joints()), self.scene.has_fluid
         )
@@ -178,13 +187,14 @@ class Simulation:
         [[changes]] of the scene they give the same run."""
         return self._changes
 
+    @takes(values=VALUES, over=NOT_NEGATIVE)
     def change(self, values: Mapping[str, Any], over: float = 0.0) -> None:
         """Give keys of the scene other values from now on: winds, streams, objectives, weights,
         strengths.
 
         values  dotted key -> value, as {"wind.0.velocity": [0.0, 5.0, 0.0]}
         over    s in which numbers go there evenly
-        raises  SceneError for a key that is unknown or cannot change, or a wrong value
+        raises  SceneError for a key that is unknown or cannot change, or a wrong value or time
         """
         from flowborne.scenes.load import with_values
 
@@ -198,11 +208,21 @@ class Simulation:
             self._start()
         return self._moment
 
+    @takes(
+        snapshot=one_of(Snapshot, wanted="what `snapshot` gave"),
+        changes=or_none(several(one_of(ChangeTable), "what `changes` gave")),
+    )
     def restore(self, snapshot: Snapshot, changes: Iterable[ChangeTable] | None = None) -> None:
         """Continue from a state of the same scene, to the same bits.
 
         changes  all changes of keys, in place of those known now, of which later ones stay
+        raises   SceneError for what is no snapshot, or one of another scene
         """
+        if unlike := snapshot.unlike(self._moment):
+            raise SceneError(
+                f"the snapshot is of another scene than {self.scene.name}: {unlike}; give one of "
+                "this scene"
+            )
         if changes is not None:
             self._changes = tuple(changes)
         world = replace(snapshot.world, setup=self.setup.where(snapshot.world.setup))
@@ -228,7 +248,7 @@ class Simulation:
             except PartError as error:
                 raise BlowUpError(self.frame + 1, 1, str(error)) from error
         beyond: tuple[str, ...] = ()
-        commands = self._with_controls(commands or {})
+        commands = self._with_controls({} if commands is None else commands)
         if commands:
             world.told, beyond = told_by(commands, world, self.frame_time, self._drives())
         with _one_blas_thread(), kernel_threads(_threads(world.setup)):
@@ -241,14 +261,16 @@ class Simulation:
         self._moment = moment
         return report
 
+    @takes(points=numbers(None, 3, wanted="(n, 3) finite numbers"))
     def flow_at(self, body: str, points: Array) -> FlowState:
         """The fluid now at points (n, 3) that ride on a body, in m from the origin of its frame and
         along its axes.
 
-        raises  ValueError for an unknown name, and without a fluid
+        raises  SceneError for points of another shape or outside the domain; ValueError for an
+                unknown name, and without a fluid
         """
         state = self.body(body)
-        return flow_at(self.world, state.position + np.atleast_2d(points) @ state.rotation.T)
+        return flow_at(self.world, state.position + points @ state.rotation.T)
 
     def body(self, name: str) -> BodyState:
         """Pose and velocity of a body now and the frame's mean force, in SI units; see `BodyState`.
@@ -276,6 +298,7 @@ class Simulation:
             moment.world.solid.act[activations_of(model, number)],
         )
 
+    @takes(name=TEXT)
     def sensor(self, name: str) -> Array:
         """(k,) reading of a sensor of the model now, in SI units; nan before the first frame for
         what only a step gives. Raises ValueError for an unknown name."""
@@ -309,6 +332,10 @@ class Simulation:
 
     def _with_controls(self, commands: Commands) -> Commands:
         """Commands with the scene's [[actuator]]s, but for those that they tell otherwise."""
+        if not isinstance(commands, Mapping):
+            raise SceneError(
+                f"commands is {commands!r:.60}; give a dict, as {{'hinge': Torque(1.0)}}"
+            )
         model = self.setup.solid
         told = [model.dofs_of(name) for name in commands if name in model.joint_names]
         controls = {

@@ -57,14 +57,14 @@ def check_force(force: Force, model: SolidModel, name: str) -> None:
     """Raise SceneError unless a force of constant components, which messages call `name`, fits the
     model."""
     where = f"the force '{name}'"
-    if force.body not in model.body_names:
+    if not isinstance(force.body, str) or force.body not in model.body_names:
         end = suggestion(str(force.body), model.body_names[1:], "The bodies are")
         raise SceneError(f"{where} is on body '{force.body}', which is not in the model{end}")
-    if force.frame not in get_args(Frame):
+    if not isinstance(force.frame, str) or force.frame not in get_args(Frame):
         raise SceneError(f"{where} has frame {force.frame!r:.60}: give 'world' or 'body'")
     vectors = {"force": force.force, "torque": force.torque, "point": force.point}
     for key, given in vectors.items():
-        if given is not None and not _is_vector(given):
+        if not (_is_vector(given) or (key == "point" and given is None)):
             raise SceneError(f"{where} has {key} {given!r:.60}: give 3 finite numbers")
     problems = immovable(model, force.body)
     problems += [f"it {problem}" for problem in beyond_plane(model, force.force, force.torque)]

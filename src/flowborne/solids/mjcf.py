@@ -27,6 +27,7 @@ from flowborne.solids.geoms import (
     geom_name,
     geom_shape,
     kind_of,
+    own_by_mesh,
     rest_poses,
 )
 from flowborne.solids.mending import exclude_joined, mend_meshes
@@ -56,7 +57,8 @@ REMEDIES = (
 class Given:
     """Settings of a model in addition to its file.
 
-    density    kg/m^3, replaces the density or mass of every geom that displaces fluid
+    density    kg/m^3, replaces the density of every geom that displaces fluid; a mass that the file
+               gives a geom wins over every density, as in MuJoCo
     densities  body -> kg/m^3 of its geoms, replaces `density`
     shapes     the user's geometries, added to those of the file
     floating   bodies on the world without a joint; they get a free joint of the same name
@@ -99,10 +101,8 @@ def bones_of(
     add_shapes(spec, given.shapes)
     for name in given.floating:
         _set_floating(spec, name, where)
-    for geom in spec.geoms:
-        density = given.density_of(geom.parent.name)
-        if density is not None:
-            geom.density, geom.mass = density, np.nan
+    for geom in _weighed_by_scene(spec, given):
+        geom.density = given.density_of(geom.parent.name)
     mj = _compiled(spec, where)
     with _errors_at(where):
         chosen = chosen_geoms(spec, mj, given.displace)
@@ -203,10 +203,10 @@ def _remedy(spec: MjSpec) -> str:
             continue
         written = " ".join(f'{key}="{str(value).lower()}"' for key, value in keys.items())
         return (
-            f"Correct its <inertial>, or add <compiler {written}/>, in a URDF within <mujoco> in "
-            "<robot>."
+            f"Correct its <inertial> or the mass of its geoms, or add <compiler {written}/>, in a "
+            "URDF within <mujoco> in <robot>."
         )
-    return "Correct its <inertial>."
+    return "Correct its <inertial> or the mass of its geoms."
 
 
 def _compiled(spec: MjSpec, where: str) -> MjModel:
@@ -216,16 +216,25 @@ def _compiled(spec: MjSpec, where: str) -> MjModel:
         raise _refusal(spec, where, error) from error
 
 
-def _weightless(spec: MjSpec, chosen: set[int], given: Given) -> list[mujoco.MjsGeom]:
-    """Geoms without mass: the scene gives a density, which applies to other geoms of the body."""
-    displacing = {geom.parent.id for geom in spec.geoms if geom.id in chosen}
+def _weighed_by_scene(spec: MjSpec, given: Given) -> list[mujoco.MjsGeom]:
+    """Geoms with a density from the scene: they have no mass in the file, and are no shape of the
+    scene with a density of its own."""
+    own = zip(own_by_mesh(given.shapes), given.shapes, strict=True)
+    dense = {mesh for mesh, shape in own if shape.density is not None}
     return [
         geom
         for geom in spec.geoms
-        if geom.id not in chosen
-        and geom.parent.id in displacing
-        and given.density_of(geom.parent.name) is not None
+        if given.density_of(geom.parent.name) is not None
+        and np.isnan(geom.mass)
+        and geom.meshname not in dense
     ]
+
+
+def _weightless(spec: MjSpec, chosen: set[int], given: Given) -> list[mujoco.MjsGeom]:
+    """Geoms without mass: the density from the scene is that of other geoms of the body."""
+    weighed = _weighed_by_scene(spec, given)
+    displacing = {geom.parent.id for geom in weighed if geom.id in chosen}
+    return [g for g in weighed if g.id not in chosen and g.parent.id in displacing]
 
 
 def _set_floating(spec: MjSpec, name: str, where: str) -> None:

@@ -11,6 +11,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
+from flowborne.base.arguments import PATH, POSITIVE, TEXT, VECTOR, or_none, takes
 from flowborne.base.one_line import one_line
 from flowborne.kernels.arrays import Array, Integers, Mask
 from flowborne.kernels.triangles import distances_to_mesh
@@ -127,6 +128,7 @@ class SolidModel:
         self._set_displaced()
 
     @classmethod
+    @takes(path=PATH, gravity=VECTOR)
     def from_file(
         cls,
         path: str | Path,
@@ -140,11 +142,12 @@ class SolidModel:
         slab     use the cross-sections at z = 0, per unit depth
         gravity  (3,) m/s^2, replaces that of the file
         given    densities, shapes and choices in addition to the file
-        raises   ValueError when the model is bad
+        raises   ValueError when the model is bad, SceneError for a wrong argument
         """
         return cls(mjcf.bones_of(Path(path), slab, gravity, given)[1], slab, shapes=given.shapes)
 
     @classmethod
+    @takes(xml=TEXT, gravity=VECTOR, density=or_none(POSITIVE))
     def from_string(
         cls,
         xml: str,
@@ -206,18 +209,26 @@ class SolidModel:
         return state
 
     def integrate(self, q: Array, velocity: Array, dt: float) -> Array:
-        """(nq,) positions after moving with constant velocity (nv,) for dt s."""
-        moved = np.array(q, dtype=np.float64)
-        mujoco.mj_integratePos(self.mj, moved, velocity, dt)
+        """(nq,) positions after moving with constant velocity (nv,) for dt s. Raises ValueError for
+        other shapes."""
+        try:
+            moved = np.array(q, dtype=np.float64)
+            mujoco.mj_integratePos(self.mj, moved, velocity, dt)
+        except (TypeError, ValueError) as error:
+            raise ValueError(f"give ({self.nq},) positions and ({self.nv},) velocities") from error
         return moved
 
     def difference(self, start: Array, end: Array) -> Array:
         """(nv,) displacement from positions `start` to `end`, both (nq,).
 
         It is the inverse of `integrate`: that of a ball is a rotation vector in its own frame.
+        Raises ValueError for other shapes.
         """
         displacement = np.zeros(self.nv)
-        mujoco.mj_differentiatePos(self.mj, displacement, 1.0, start, end)
+        try:
+            mujoco.mj_differentiatePos(self.mj, displacement, 1.0, start, end)
+        except TypeError as error:
+            raise ValueError(f"give ({self.nq},) positions") from error
         return displacement
 
     @cached_property
@@ -397,7 +408,7 @@ def _names(mj: mujoco.MjModel, kind: mujoco.mjtObj, count: int) -> tuple[str, ..
 
 
 def _number(numbers: Mapping[str, int], name: str, what: str) -> int:
-    if name not in numbers:
+    if not isinstance(name, str) or name not in numbers:
         raise ValueError(f"no {what} '{name}' in the model. It has: {', '.join(numbers)}.")
     return numbers[name]
 

@@ -179,14 +179,21 @@ def wrong_spec_values(spec: mujoco.MjSpec) -> Iterator[str]:
             if given and not _possible(np.array(value), 0.0):
                 called = f"'{geom.name}'" if geom.name else f"of body '{geom.parent.name}'"
                 yield f"geom {called} has {attribute} {value:g}. Give a number of 0 or more."
-    for called, elements in (("joint", spec.joints), ("tendon", spec.tendons)):
+    for called, attribute, elements in (
+        ("joint", "range", spec.joints),
+        ("joint", "actfrcrange", spec.joints),
+        ("tendon", "range", spec.tendons),
+        ("tendon", "actfrcrange", spec.tendons),
+        ("actuator", "ctrlrange", spec.actuators),
+        ("actuator", "forcerange", spec.actuators),
+        ("actuator", "actrange", spec.actuators),
+    ):
         for element in elements:
-            low, high = element.range
-            if low > high:
-                yield (
-                    f"{called} '{element.name}' has a range from {low:g} to {high:g}. "
-                    "Put the smaller number first."
-                )
+            low, high = getattr(element, attribute)
+            if low > high or low == high != 0.0:
+                key = attribute.replace("actfrc", "actuatorfrc")
+                how = "Put the smaller number first" if low > high else "Give two numbers"
+                yield f"{called} '{element.name}' has a {key} from {low:g} to {high:g}. {how}."
 
 
 def wrong_model_values(mj: mujoco.MjModel) -> Iterator[str]:

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from flowborne.base.arguments import COUNT, PATH, PROGRESS, TEXTS, or_none, takes
 from flowborne.base.errors import SceneError, fault_of
 from flowborne.base.extras import missing_to_draw
 from flowborne.base.phrases import listed
@@ -39,6 +40,13 @@ CAPTURED = "captured"
 ENDING = ".bvh"
 
 
+@takes(
+    clips=PATH,
+    out=or_none(PATH),
+    overrides=or_none(TEXTS),
+    workers=or_none(COUNT),
+    progress=or_none(PROGRESS),
+)
 def run_clips(
     scene: str | Path,
     clips: str | Path,
@@ -63,8 +71,6 @@ def run_clips(
     raises     RunFolderError if a folder is wrong and SceneError if the scene is, before anything
                is written; KeyboardInterrupt after Ctrl-C: the same call continues
     """
-    if workers is not None and workers < 1:
-        raise RunFolderError(f"workers is {workers}; give 1 or more")
     settings = dict(overrides or {})
     names, skipped = _clips_in(Path(clips))
     wanted = load_scene(scene, settings)
@@ -76,7 +82,7 @@ def run_clips(
     folder = Path("runs") / f"{wanted.name}-clips" if out is None else Path(out)
     page = folder / PAGE
     if page.exists() and not is_own_page(page):
-        raise RunFolderError(f"{page} was not made by flowborne; name another folder with --out")
+        raise RunFolderError(f"{page} was not made by flowborne; name another folder")
     make_folder(folder)
     batch = Batch(wanted.name, wanted.controlled_joints(), page, len(names), skipped)
     with displayed(progress) as show:
@@ -86,7 +92,7 @@ def run_clips(
             try:
                 batch.clips.append(job.run(clip))
             except KeyboardInterrupt as stop:
-                same = "the same command" + " without --replace" * replace
+                same = "the same command" + " without replace=True" * replace
                 raise KeyboardInterrupt(f"stopped in {job.label}; {same} continues there") from stop
             write_page(batch)
     return batch
@@ -96,13 +102,13 @@ def _clips_in(folder: Path) -> tuple[list[Path], tuple[str, ...]]:
     """The clips of a folder and the names of all else in it. Raises RunFolderError without any."""
     if not folder.is_dir():
         what = f"{folder} is a file" if folder.exists() else f"there is no folder {folder}"
-        raise RunFolderError(f"{what}; give --clips a folder of BVH files")
+        raise RunFolderError(f"{what}; give a folder of BVH files")
     found = sorted(folder.iterdir())
     clips = [path for path in found if path.suffix.lower() == ENDING and path.is_file()]
     others = tuple(p.name + "/" * p.is_dir() for p in found if p not in clips)
     if not clips:
         has = f"only {listed(others)}" if others else "nothing"
-        raise RunFolderError(f"{folder} has {has} and no BVH file; give --clips a folder of clips")
+        raise RunFolderError(f"{folder} has {has} and no BVH file; give a folder of clips")
     taken = {CAPTURED: "the clips as captured", PAGE: "the page"}
     for clip in clips:
         if (name := clip.stem.casefold()) in taken:

@@ -12,7 +12,8 @@ from typing import Literal
 import numpy as np
 from scipy.optimize import brentq
 
-from flowborne.base.errors import SceneError
+from flowborne.base.arguments import COUNT, COUNTS, PATH, TEXT, TEXTS, Kind, or_none, takes
+from flowborne.base.errors import PartError, SceneError
 from flowborne.kernels.arrays import Array
 from flowborne.scenes.load import load_scene
 from flowborne.scenes.schema import Scene
@@ -151,6 +152,14 @@ class ErrorBar:
         return f"{self.value:.4g} ± {self.uncertainty:.2g} ({', '.join(parts)})"
 
 
+@takes(
+    measure=Kind(lambda m: m if callable(m) else TEXT.read(m), "a column's name, or a function"),
+    resolutions=COUNTS,
+    steps=COUNTS,
+    frames=or_none(COUNT),
+    settings=or_none(TEXTS),
+    out=or_none(PATH),
+)
 def error_bar(
     scene: str | Path,
     measure: str | Callable[[OpenRun], float],
@@ -179,7 +188,8 @@ def error_bar(
     raises       ValueError for fewer than two grids and two numbers of steps, or if they do not
                  grow, for an unknown column, and a number that is not finite; SceneError if the
                  scene is wrong, or one of its runs ends with another outcome than `done`;
-                 RunFolderError if `out` already contains such runs
+                 RunFolderError if `out` already contains such runs;
+                 PartError if `measure` fails
     """
     for name, given in (("resolutions", resolutions), ("steps", steps)):
         if len(given):
@@ -256,7 +266,8 @@ def _remaining(values: Array, spacings: Array, order: float) -> float:
 
 def _measured(done: OpenRun, measure: str | Callable[[OpenRun], float]) -> float:
     if callable(measure):
-        return float(measure(done))
+        with PartError.guarding("the measure"):
+            return float(measure(done))
     if measure not in done.history:
         raise ValueError(
             f"the history has no column '{measure}'. Its columns are: {', '.join(done.history)}."

@@ -11,6 +11,7 @@ from time import perf_counter
 
 from filelock import FileLock, Timeout
 
+from flowborne.base.arguments import COUNT, PATH, PROGRESS, TEXT, or_none, read, takes
 from flowborne.base.atomic import write_text
 from flowborne.base.extras import optional
 from flowborne.base.progress import Progress, RunProgress, displayed
@@ -91,6 +92,7 @@ class Plan:
         return member_id(self.digest, self.settings(sample, repeat))
 
 
+@takes(out=or_none(PATH), workers=or_none(COUNT), dask=or_none(TEXT), progress=or_none(PROGRESS))
 def study(
     file: str | Path | Plan,
     out: str | Path | None = None,
@@ -115,7 +117,7 @@ def study(
               lost; RunFolderError if `out` cannot be written or another process is writing there;
               KeyboardInterrupt after Ctrl-C. The same call then continues
     """
-    plan = file if isinstance(file, Plan) else Plan.of(file)
+    plan = file if isinstance(file, Plan) else Plan.of(read(PATH, file, "file"))
     optional("pyarrow", "pyarrow", "study", "tables of studies", "written")
     folder = Path("studies") / plan.study.name if out is None else Path(out)
     with _locked(folder), displayed(progress) as show:
@@ -217,7 +219,7 @@ def _locked(folder: Path) -> Iterator[None]:
     found = [entry.name for entry in folder.iterdir()] if folder.is_dir() else []
     if COPY not in found and not all(name.startswith(".") for name in found):
         raise RunFolderError(
-            f"{folder} is not empty and was not made by a study; name another folder with --out"
+            f"{folder} is not empty and was not made by a study; name another folder"
         )
     make_folder(folder)
     try:
@@ -226,5 +228,5 @@ def _locked(folder: Path) -> Iterator[None]:
     except Timeout:
         raise RunFolderError(
             f"another process is writing the study in {folder}; wait for its end, or name another "
-            "folder with --out"
+            "folder"
         ) from None

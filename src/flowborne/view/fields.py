@@ -64,8 +64,7 @@ class FieldDye:
         names = [name for name in run.state(0) if name.startswith("scalar_")]
         if not names:
             raise ValueError(
-                "the run has no dye to show; draw another field with --set field=vorticity, speed "
-                "or pressure"
+                "the run has no dye to show; draw another field: vorticity, speed or pressure"
             )
         sampled = run.sampled(samples)
         colours = [style.DYES[n % len(style.DYES)] for n in range(len(names))]

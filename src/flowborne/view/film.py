@@ -54,7 +54,7 @@ def make_preview(folder: Path, progress: Progress | None = None, shot: Shot | No
     if len(numbers) < 2:
         raise ValueError(
             f"{folder} has one frame, which makes a picture and no film; "
-            "continue the run with --resume"
+            "continue the run with resume=True"
         )
     write_film(run, RunFolder(folder).film, progress, shot)
 
@@ -111,8 +111,8 @@ def write_film(
     shot = run.shot if shot is None else shot
     if shot.transparent and path.suffix.lower() == ".mp4":
         raise ValueError(
-            "a film in MP4 cannot be transparent; write an image sequence with --out frames.png, "
-            "an image that moves with --out film.webp, or name a colour with --set background"
+            "a film in MP4 cannot be transparent; write an image sequence (frames.png) "
+            "or an image that moves (film.webp), or name a colour of the background"
         )
     rate = shot.frames_per_second or run.frames_per_second
     with closing(_frames(run, shot, progress)) as frames:

@@ -52,7 +52,9 @@ def joint_curves(run: Run) -> tuple[str, dict[str, Array]]:
 
 def objective_title(run: Run) -> str:
     """Title of the plot of the objective: its goal, its kind and its unit, if they are known."""
-    tables = [table for table in run.tables.get("objectives", ()) if table.get("weight", 1.0) != 0.0]
+    tables = [
+        table for table in run.tables.get("objectives", ()) if table.get("weight", 1.0) != 0.0
+    ]
     title = "objective"
     if len(tables) == 1:
         title += f": {tables[0].get('goal', 'least')} {tables[0]['kind']}"

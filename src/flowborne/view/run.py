@@ -169,7 +169,7 @@ class Run(StoredRun):
         if len(positions) != len(self.geoms):
             raise RunFolderError(
                 f"model.json of the run has {len(self.geoms)} geometries and its states "
-                f"{len(positions)}; start the run again with --replace"
+                f"{len(positions)}; start the run again with replace=True"
             )
 
 

@@ -15,6 +15,8 @@ from enum import IntEnum
 import mujoco
 import numpy as np
 
+from flowborne.base.arguments import NOT_NEGATIVE, POSITIVE, check
+from flowborne.base.errors import SceneError
 from flowborne.base.phrases import location
 from flowborne.kernels import elastic
 from flowborne.kernels.arrays import Array, Integers, Mask
@@ -50,6 +52,7 @@ class Tissue:
     poisson  from 0 to below 0.5
     density  kg/m^3
     damping  s, Rayleigh's: the damping matrix is this times the stiffness matrix
+    raises   SceneError for other numbers
     """
 
     young: float
@@ -57,6 +60,11 @@ class Tissue:
     density: float
     damping: float = 0.0
     law: Law = Law.SAINT_VENANT_KIRCHHOFF
+
+    def __post_init__(self) -> None:
+        check(self, young=POSITIVE, density=POSITIVE, damping=NOT_NEGATIVE, poisson=NOT_NEGATIVE)
+        if self.poisson >= 0.5:
+            raise SceneError(f"poisson is {self.poisson:g}; give a number from 0 to below 0.5")
 
     @property
     def moduli(self) -> tuple[float, float]:
