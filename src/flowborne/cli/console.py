@@ -11,7 +11,7 @@ from flowborne.base.phrases import listed
 if TYPE_CHECKING:
     from flowborne.coupling.world import Setup
     from flowborne.scenes.schema import Scene
-    from flowborne.sim.running import RunResult
+    from flowborne.sim.endings import RunResult
     from flowborne.studies.batch_page import Batch
 
 

@@ -1,8 +1,8 @@
 """The command `flowborne`.
 
-Exit codes: 1 if a run blew up or could not be written, 2 for wrong input, 3 for a complete run
-with doubtful results and for `check --strict` with warnings, 130 after an interruption. Each error
-is one message on stderr.
+Exit codes: 1 if a run blew up, was stopped by an error or could not be written, 2 for wrong input,
+3 for a complete run with doubtful results and for `check --strict` with warnings, 130 after an
+interruption. Each error is one message on stderr.
 """
 
 from __future__ import annotations
@@ -221,7 +221,7 @@ def _run_one(
     folder = Path("runs") / loaded.name if out is None else out
     _say_if_not_drawn(given["film"])
     with ProgressDisplay() as progress:
-        from flowborne.sim.running import RunOutcome
+        from flowborne.sim.endings import RunOutcome
         from flowborne.sim.running import run as run_scene
 
         result = run_scene(loaded, folder, progress=progress, **given)
@@ -546,7 +546,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         code = FAILED
     except Exception as error:
         log.debug("the error", exc_info=error)
-        complain(fault_of(error))
+        complain("; ".join([fault_of(error), *getattr(error, "__notes__", ())]))
         code = FAILED
     sys.exit(code if isinstance(code, int) else 0)
 

@@ -13,6 +13,7 @@ preview.mp4      the film
 
 from __future__ import annotations
 
+import errno
 import os
 import re
 import shutil
@@ -330,6 +331,12 @@ def cannot_write(path: Path, error: OSError) -> RunFolderError:
     return RunFolderError(
         f"{path} cannot be written ({error.strerror}); name another folder with --out"
     )
+
+
+def write_remedy(error: OSError) -> str:
+    """What to do where the system refuses to write into the folder of a run."""
+    full = error.errno in (errno.ENOSPC, errno.EDQUOT)
+    return "make room" if full else "make the folder and its files writable"
 
 
 def make_folder(path: Path) -> None:

@@ -215,15 +215,7 @@ class Simulation:
         splits = self.report is not None and self.report.step.added_mass.done
         if splits != world.setup.splits:  # asked for once, asked for again
             world.setup = world.setup.but(splits=splits)
-        if commands is None and self._policy is not None:
-            try:
-                commands = self._policy(self)
-            except PartError as error:
-                raise BlowUpError(self.frame + 1, 1, str(error)) from error
-        beyond: tuple[str, ...] = ()
-        commands = self._with_controls(commands or {})
-        if commands:
-            world.told, beyond = told_by(commands, world, self.frame_time, self._drives())
+        beyond = self._command(world, commands)
         with _one_blas_thread(), kernel_threads(_threads(world.setup)):
             report = self._advance(world, self.frame + 1, beyond)
         world.told = NOTHING_TOLD
@@ -299,6 +291,25 @@ class Simulation:
         from flowborne.scenes.load import raw_of
 
         return raw_of(self.scene)
+
+    def _command(self, world: World, commands: Commands | None) -> tuple[str, ...]:
+        """Give the world commands for the frame, by default those of the policy; what was beyond
+        limits. Raises as `advance_frame`."""
+        policy = self.scene.policy if commands is None else None
+        try:
+            if policy is not None and self._policy is not None:
+                commands = self._policy(self)
+            if not (commands := self._with_controls(commands or {})):
+                return ()
+            world.told, beyond = told_by(commands, world, self.frame_time, self._drives())
+            return beyond
+        except PartError as error:
+            raise BlowUpError(self.frame + 1, 1, str(error)) from error
+        except SceneError as error:
+            if policy is None:
+                raise
+            cause = f"policy '{policy.function}': {error}"
+            raise BlowUpError(self.frame + 1, 1, cause) from error
 
     def _with_controls(self, commands: Commands) -> Commands:
         """Commands with the scene's [[actuator]]s, but for those that they tell otherwise."""

@@ -17,7 +17,8 @@ from flowborne.kernels.arrays import Array
 from flowborne.runs.open_run import OpenRun
 from flowborne.scenes.load import load_scene
 from flowborne.scenes.schema import Scene
-from flowborne.sim.running import RunOutcome, run
+from flowborne.sim.endings import RunOutcome
+from flowborne.sim.running import run
 
 FORMAL_ORDER = 2.0
 """Order of the scheme in grid and step for smooth flows."""
