@@ -1,13 +1,18 @@
 """Whatever ends a run: its frames are written, its status is true, and it can be continued."""
 
 import errno
+import os
 import re
 
 import numpy as np
 import pytest
 
+from flowborne.base import given
 from flowborne.cli import main as cli
-from flowborne.runs import recorder
+from flowborne.runs import checkpoint, recorder, run_folder, states
+from flowborne.runs.history import History
+from flowborne.runs.run_folder import RunFolder, RunFolderError
+from flowborne.scenes import save
 from flowborne.sim import running
 from flowborne.sim.endings import RunInterrupted, RunOutcome
 from flowborne.sim.simulation import BlowUpError, Simulation
@@ -72,8 +77,8 @@ def message_of(out, outcome="failed", saved=LAST):
     """
     summary = summary_of(out)
     assert (summary["outcome"], summary["frames"]) == (outcome, LAST)
-    history, states, _ = numbers(out)
-    assert (len(history), len(states)) == (LAST, LAST + 1)
+    history, written, _ = numbers(out)
+    assert (len(history), len(written)) == (LAST, LAST + 1)
     with np.load(out / "checkpoint.npz") as arrays:
         assert int(arrays["frame"]) == saved
     assert f"--out {out} --resume" in summary["message"]
@@ -82,9 +87,9 @@ def message_of(out, outcome="failed", saved=LAST):
 
 @pytest.mark.parametrize("case", GIVEN)
 def test_a_policy_with_a_wrong_command_loses_no_frame(tmp_path, capsys, case):
-    given, said = GIVEN[case]
+    command, said = GIVEN[case]
     module, out = f"steer_{case}", tmp_path / "run"
-    scene = steered(tmp_path, module, given)
+    scene = steered(tmp_path, module, command)
     with pytest.raises(SystemExit) as end:
         cli.main(["run", str(scene), "--out", str(out), "--no-film"])
     assert end.value.code == 1
@@ -150,10 +155,10 @@ def test_an_interrupt_of_progress_is_one_of_the_run(small_scene, tmp_path):
 def failing(function, error, after=LAST):
     """The function of a simulation, which raises in the frame after `after`."""
 
-    def fail(simulation, *given):
+    def fail(simulation, *arguments):
         if simulation.frame == after:
             raise error
-        return function(simulation, *given)
+        return function(simulation, *arguments)
 
     return fail
 
@@ -258,3 +263,110 @@ def test_a_start_that_fails_leaves_no_folder(small_scene, tmp_path, monkeypatch)
     with pytest.raises(MemoryError):
         run(small_scene, tmp_path / "run")
     assert not (tmp_path / "run").exists()
+
+
+def refused(number):
+    """A function that the system refuses by an error of a number."""
+
+    def refuse(*given, **options):
+        raise OSError(number, os.strerror(number))
+
+    return refuse
+
+
+REFUSED = {
+    "the mark": (run_folder, "write_json", errno.EROFS, "readable and writable"),
+    "the scene": (save, "write_atomically", errno.ENOSPC, "make room"),
+    "the history": (History, "reopen", errno.EACCES, "readable and writable"),
+    "the checkpoint": (checkpoint, "read_arrays", errno.EACCES, "readable and writable"),
+    "states": (RunFolder, "drop_states_after", errno.EROFS, "readable and writable"),
+}
+
+
+@pytest.mark.parametrize("what", REFUSED)
+def test_a_run_that_the_disc_refuses_to_resume_is_not_to_be_replaced(
+    small_scene, tmp_path, monkeypatch, what
+):
+    place, function, number, remedy = REFUSED[what]
+    out = tmp_path / "run"
+    run(small_scene, out, frames=LAST)
+    before, summary = numbers(out), summary_of(out)
+    with monkeypatch.context() as patch:
+        patch.setattr(place, function, refused(number))
+        with pytest.raises(RunFolderError, match=f"cannot be resumed: .*{remedy}, then") as said:
+            run(small_scene, out, resume=True)
+    assert "--replace" not in str(said.value)
+    assert (numbers(out), summary_of(out)) == (before, summary)
+    assert run(small_scene, out, resume=True, frames=FRAMES).outcome is RunOutcome.DONE
+
+
+@pytest.mark.parametrize("name", ["scene.toml", "summary.json", "states/000003.npz"])
+def test_a_file_that_may_not_be_read_is_not_to_be_removed(small_scene, tmp_path, monkeypatch, name):
+    out = tmp_path / "run"
+    run(small_scene, out, frames=LAST)
+
+    def refusing(function):
+        def refuse(path, *flags):
+            if str(path) == str(out / name):
+                raise PermissionError(errno.EACCES, "Permission denied", str(path))
+            return function(path, *flags)
+
+        return refuse
+
+    monkeypatch.setattr(given.os, "open", refusing(os.open))
+    monkeypatch.setattr(states, "check_file", refusing(given.check_file))
+    with pytest.raises(RunFolderError, match=r"cannot be read.*make (it|them) readable") as said:
+        run(small_scene, out, resume=True)
+    assert "--replace" not in str(said.value)
+    assert "remove" not in str(said.value)
+
+
+def test_a_disc_without_room_for_a_summary_has_the_true_status(small_scene, tmp_path, monkeypatch):
+    """As /dev/full does: nothing new can be written, and what is there keeps its blocks."""
+    out = tmp_path / "run"
+
+    def fill(news):
+        if news.frame == LAST:
+            full = refused(errno.ENOSPC)
+            monkeypatch.setattr(recorder, "write_atomically", full)
+            monkeypatch.setattr(checkpoint, "write_atomically", full)
+            monkeypatch.setattr(run_folder, "write_json", full)
+
+    result = run(small_scene, out, progress=fill)
+    summary = summary_of(out)
+    assert (summary["outcome"], summary["message"]) == ("not_written", result.message)
+    assert f"{LAST} is kept, but its checkpoint could not be written" in result.message
+    assert RunFolder(out).model_files()
+    monkeypatch.undo()
+    assert run(small_scene, out, resume=True).outcome is RunOutcome.DONE
+    run(small_scene, tmp_path / "whole")
+    assert numbers(out) == numbers(tmp_path / "whole")
+
+
+def test_an_ended_mark_that_does_not_fit_leaves_the_earlier_one(tmp_path, monkeypatch):
+    folder = RunFolder.create(tmp_path / "run")
+    before = folder.summary.read_bytes()
+    with monkeypatch.context() as patch:
+        patch.setattr(run_folder, "open", Short, raising=False)
+        with pytest.raises(OSError, match="No space left"):
+            folder.mark_ended("not_written", "x" * 10_000)
+    assert folder.summary.read_bytes() == before
+
+
+class Short:
+    """A file of which a disc takes the first 4096 bytes."""
+
+    def __init__(self, *given, **options):
+        self.file = open(*given, **options)  # noqa: SIM115
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *raised):
+        self.file.close()
+
+    def write(self, content):
+        return self.file.write(content[:4096])
+
+    def __getattr__(self, name):
+        return getattr(self.file, name)

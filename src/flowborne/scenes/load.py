@@ -216,7 +216,7 @@ def read_tables(path: Path, kind: str = "scene") -> dict[str, Any]:
         content = read_file(path).decode("utf-8-sig")
         return tomllib.loads(content)
     except OSError as error:
-        raise SceneError(f"{kind} {path} cannot be read: {error.strerror}. Mend that.") from None
+        raise SceneError(f"{kind} {path} cannot be read: {error.strerror}. Mend that.") from error
     except UnicodeDecodeError as error:
         raise SceneError(
             f"{kind} {path.name}: byte {error.start + 1} is not UTF-8 text. Save it as UTF-8."

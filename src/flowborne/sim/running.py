@@ -27,6 +27,7 @@ from flowborne.runs.run_folder import (
     RunFolderError,
     cannot_write,
     check_space,
+    is_damage,
     write_remedy,
 )
 from flowborne.runs.states import check_states
@@ -187,17 +188,13 @@ class _Run:
             self.history = History.reopen(folder.history, self.columns, simulation.frame)
             folder.drop_states_after(simulation.frame)
             self._recorded = simulation.snapshot()
-        except (FileNotFoundError, ValueError) as error:
-            raise RunFolderError(
-                f"{folder.path} cannot be resumed: {error}; start again with --replace"
-            ) from error
-        except OSError as error:  # the run is whole
-            with suppress(OSError):
-                folder.write_summary(ended)
-            raise RunFolderError(
-                f"{folder.path} cannot be resumed ({error.strerror or error}); "
-                f"{write_remedy(error)}, then resume it again"
-            ) from error
+        except (OSError, ValueError) as error:
+            remedy = "start again with --replace"
+            if not is_damage(error):
+                remedy = f"{write_remedy(error)}, then the same command resumes it"
+                with suppress(OSError):
+                    folder.write_summary(ended)
+            raise RunFolderError(f"{folder.path} cannot be resumed: {error}; {remedy}") from error
 
     def go_on(self) -> tuple[RunOutcome, str]:
         """Advance and record to the last frame, or until the run stops; outcome and message.
@@ -278,8 +275,10 @@ class _Run:
         except OSError as error:
             if whole:
                 outcome, message = RunOutcome.NOT_WRITTEN, self._not_written(error)
-            else:
-                message += f"; its summary could not be written ({error.strerror or error})"
+            try:
+                folder.mark_ended(outcome.name.lower(), message)
+            except OSError:
+                message += "; summary.json could not be written and has an earlier state"
         result = RunResult(folder.path, outcome, message, self.simulation.frame, summary)
         if outcome is RunOutcome.INTERRUPTED or self._signals.asked:
             raise RunInterrupted(result)
