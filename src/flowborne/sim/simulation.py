@@ -26,9 +26,10 @@ from flowborne.kernels.faces import is_finite
 from flowborne.kernels.jit import LARGE, cores, kernel_threads
 from flowborne.runs.summary import BUDGET_OPEN
 from flowborne.scenes.actuators import joints_of_actuators, scene_controls
-from flowborne.scenes.changes import ChangeTable, values_at
+from flowborne.scenes.changes import ChangeTable, plain, values_at
 from flowborne.sim.columns import Columns
 from flowborne.sim.frame import PARTS, FrameReport, Snapshot
+from flowborne.sim.turn import Turn
 from flowborne.solids.flesh import inversion
 from flowborne.solids.model import FREE, turning_dofs
 from flowborne.solids.motors import activations_of, driven_by, outputs_of
@@ -135,6 +136,7 @@ class Simulation:
         self._policy = None if policy is None else policy.build()
         self._moment = Snapshot(built.world, 0, None)
         self._started = False
+        self._turn = Turn()
         self._step: Step = step
 
     @property
@@ -181,9 +183,10 @@ class Simulation:
         """
         from flowborne.scenes.load import with_values
 
-        with_values(self.scene, values)
+        change = ChangeTable(time=self.time, over=over, values=plain(values))
+        with_values(self.scene, change.values)
         earlier = (change for change in self._changes if change.time <= self.time)
-        self._changes = (*earlier, ChangeTable(time=self.time, over=over, values=dict(values)))
+        self._changes = (*earlier, change)
 
     def snapshot(self) -> Snapshot:
         """The state now. A frame makes a new one, so it costs nothing to keep."""
@@ -208,8 +211,13 @@ class Simulation:
                   Control; and a Force by a name of its own. The scene's motions and its controller
                   move the other joints. By default the scene's policy tells
         raises    BlowUpError if a step or the policy fails or a measure is not a finite number;
-                  SceneError for a wrong command. After any error the state is that before the frame
+                  SceneError for a wrong command; RuntimeError while another thread advances it.
+                  After any error the state is that before the frame
         """
+        with self._turn:
+            return self._next_frame(commands)
+
+    def _next_frame(self, commands: Commands | None) -> FrameReport:
         self._apply_changes()
         world = self.world.copy()
         splits = self.report is not None and self.report.step.added_mass.done
