@@ -522,6 +522,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         os.environ[name] = "1"
     if not sys.warnoptions:
         warnings.simplefilter("ignore")  # of libraries; errors have their own messages
+    logging.getLogger().addHandler(logging.NullHandler())  # what libraries log is not for stderr
     given = list(sys.argv[1:] if arguments is None else arguments)
     try:
         code = app(given or ["--help"], prog_name="flowborne", standalone_mode=False)

@@ -201,6 +201,8 @@ def find(name_or_path: str | Path) -> Path:
             return path
         if path.is_dir():
             raise SceneError(f"scene {text} is a folder. Give the TOML file in it.")
+    except PermissionError as error:
+        raise SceneError(f"scene {text} cannot be read: {error.strerror}. Mend that.") from error
     except (OSError, ValueError):
         raise SceneError(f"{text[:60]} ... is no name of a file. Shorten it.") from None
     if path.suffix == ".toml" or path.parent != Path():
