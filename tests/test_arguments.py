@@ -45,9 +45,7 @@ WRONG: dict[str, Any] = {
     "a type": int,
 }
 
-BODY = (
-    '<mujoco><worldbody><body name="b"><freejoint/><geom size=".1"/></body></worldbody></mujoco>'
-)
+BODY = '<mujoco><worldbody><body name="b"><freejoint/><geom size=".1"/></body></worldbody></mujoco>'
 GRID = fb.Grid.slab(8, 8, 0.125, (-0.5, -0.5))
 
 

@@ -16,7 +16,7 @@ from flowborne.cli import main as cli
 from flowborne.control.executors import Processes
 from flowborne.runs.run_folder import LOCK_NAME, RunFolder, RunFolderError
 from flowborne.sim import running
-from flowborne.sim.running import RunInterrupted, RunOutcome
+from flowborne.sim.endings import RunInterrupted, RunOutcome
 from flowborne.sim.simulation import BlowUpError, Simulation
 
 from .made_runs import numbers, run, start, summary_of, wait_for_rows

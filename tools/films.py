@@ -14,7 +14,8 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from flowborne.scenes.load import load_scene
-from flowborne.sim.running import RunOutcome, run
+from flowborne.sim.endings import RunOutcome
+from flowborne.sim.running import run
 from flowborne.view.film import write_film
 from flowborne.view.run import Run
 

@@ -36,7 +36,8 @@ from flowborne.scenes.listing import (
 from flowborne.scenes.load import load_scene, read_scene, scene_names
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.schema_film import CameraTable
-from flowborne.sim.running import RunOutcome, run
+from flowborne.sim.endings import RunOutcome
+from flowborne.sim.running import run
 from flowborne.view.pictures import Picture
 from flowborne.view.run import Run
 from markdown_text import plain

@@ -38,8 +38,9 @@ if TYPE_CHECKING:
     from flowborne.scenes.load import load_scene
     from flowborne.scenes.schema import Scene
     from flowborne.sim.checked import Checked, check
+    from flowborne.sim.endings import RunInterrupted, RunResult
     from flowborne.sim.frame import FrameReport, Snapshot
-    from flowborne.sim.running import RunInterrupted, RunResult, run
+    from flowborne.sim.running import run
     from flowborne.sim.simulation import BlowUpError, Simulation
     from flowborne.solids.force import Force
     from flowborne.solids.model import SolidModel, SolidState
@@ -159,8 +160,8 @@ _PLACES = {
     "Position": "flowborne.control.commands",
     "Refinement": "flowborne.studies.error_bars",
     "RunFolderError": "flowborne.runs.run_folder",
-    "RunInterrupted": "flowborne.sim.running",
-    "RunResult": "flowborne.sim.running",
+    "RunInterrupted": "flowborne.sim.endings",
+    "RunResult": "flowborne.sim.endings",
     "Scene": "flowborne.scenes.schema",
     "SceneError": "flowborne.base.errors",
     "Setup": "flowborne.coupling.world",

@@ -8,6 +8,7 @@ import os
 import re
 import struct
 import sys
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,7 @@ from numpy.testing import assert_array_equal
 
 import flowborne as fb
 from flowborne.base.errors import SceneError
+from flowborne.characters import usd_gate
 from flowborne.characters.division import closed
 from flowborne.characters.gltf_document import inside
 from flowborne.characters.limits import check_frames, check_size, check_work
@@ -409,3 +411,24 @@ def test_what_usd_prints_through_python_is_not_shown(capsys: pytest.CaptureFixtu
     with pytest.raises(SceneError, match=r"box\.usdc cannot be read"):
         read()
     assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize("ending", [".usda", ".usdz"])
+def test_a_usd_file_that_doubles_its_prims_at_each_level_ends(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ending: str
+) -> None:
+    """2 kB of references are a billion prims. Another process reads them, for a time."""
+    levels = (
+        f'def "p{n}" {{ def "x" (references = </p{n + 1}>) {{}}\n'
+        f'def "y" (references = </p{n + 1}>) {{}}\n}}\n'
+        for n in range(30)
+    )
+    text = "#usda 1.0\n" + "".join(levels) + 'def "p30" {}\n'
+    path = tmp_path / f"bomb{ending}"
+    path.write_text(text)
+    if ending == ".usdz":
+        with zipfile.ZipFile(path, "w") as package:
+            package.writestr("bomb.usda", text)
+    monkeypatch.setattr(usd_gate, "PROBE_SECONDS", 2.0)
+    with pytest.raises(SceneError, match=rf"bomb{ending} cannot be read as USD"):
+        read_source(path)

@@ -7,7 +7,7 @@ from flowborne.cli.main import BLAS_THREADS, main
 from flowborne.coupling.world import Fluid
 from flowborne.runs.history import History
 from flowborne.runs.summary import doubts_of
-from flowborne.sim.running import RunOutcome
+from flowborne.sim.endings import RunOutcome
 from flowborne.worlds import Boundaries, BoundaryPeriodic
 
 from ..made_runs import run, summary_of

@@ -90,7 +90,7 @@ def test_a_run_that_cannot_be_written_can_be_read(tmp_path, monkeypatch):
     finished_run(tmp_path / "run")
     monkeypatch.setattr(os, "access", lambda path, mode: False)
     folder = RunFolder.existing(tmp_path / "run")
-    with pytest.raises(RunFolderError, match="run cannot be written; give yourself the right"):
+    with pytest.raises(RunFolderError, match="run cannot be written; make it and its"):
         folder.check_writable()
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from flowborne.runs.strained import strained
-from flowborne.sim.running import RunOutcome
+from flowborne.sim.endings import RunOutcome
 from flowborne.solids.model import SolidModel
 from flowborne.solids.passed import Equalities, passed_stops
 

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+import tomli_w
 
 import flowborne as fb
 from flowborne.scenes.changes import ChangeTable, values_at
@@ -44,6 +47,26 @@ def test_a_wind_that_turns_pushes_the_other_way(small_scene: Path) -> None:
         after = simulation.advance_frame().drag()[1, 0]
     assert before > 0.0
     assert after < 0.0
+
+
+ARRAYS = [np.array, np.float32, tuple, lambda values: [np.float64(value) for value in values]]
+
+
+@pytest.mark.parametrize("kind", ARRAYS)
+def test_arrays_change_a_value_as_lists_do(small_scene: Path, kind: Callable[[Any], Any]) -> None:
+    with Simulation(small_scene, workers=1) as plain, Simulation(small_scene, workers=1) as other:
+        for wind in ([0.0, 5.0, 0.0], [1.0, -5.0, 0.0], [1.0, -5.0, 0.0]):
+            plain.change({"wind.0.velocity": wind, "control.0.strength": 7.5}, over=0.05)
+            given = kind(wind), np.float64(7.5)
+            other.change({"wind.0.velocity": given[0], "control.0.strength": given[1]}, over=0.05)
+            for simulation in (plain, other, plain, other):
+                simulation.advance_frame()
+        assert bits(plain) == bits(other)
+        assert other.changes == plain.changes
+        assert tomli_w.dumps({"values": other.changes[0].values})
+        with pytest.raises(fb.SceneError, match="velocity"):
+            other.change({"wind.0.velocity": kind([0.0, np.nan, 0.0])})
+        other.advance_frame()
 
 
 def test_a_scene_with_the_changes_repeats_the_run(small_scene: Path) -> None:

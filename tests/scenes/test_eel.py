@@ -14,7 +14,7 @@ from flowborne.motion.formula import Formula
 from flowborne.motion.tracks import TrajectoryFormula
 from flowborne.scenes.build import build
 from flowborne.scenes.load import library, load_scene
-from flowborne.sim.running import RunOutcome
+from flowborne.sim.endings import RunOutcome
 from flowborne.sim.simulation import Simulation
 
 THICKNESS, LENGTH, WATER = 0.016, 0.61, 1000.0

@@ -13,6 +13,8 @@ from flowborne.scenes import flesh as flesh_room
 from flowborne.scenes.build import build
 from flowborne.scenes.load import check_scene, load_scene
 from flowborne.scenes.save import scene_files, scene_to_resume, write_scene
+from flowborne.scenes.warn import stale_meshes
+from flowborne.sim.running import run
 from flowborne.sim.simulation import BlowUpError, Simulation
 from flowborne.solids.flesh import inversion
 from flowborne.solids.tissue.mesh import FleshMesh
@@ -183,6 +185,37 @@ def test_a_run_folder_keeps_its_mesh(write: Write, tmp_path: Path, counted: list
     other = load_scene(folder.scene, {"flesh.0.thickness": "0.09"})
     assert counted == ["upper lower"]
     assert scene_files(other)["flesh-arm.npz"] != files["flesh-arm.npz"]
+
+
+STALE = [
+    (("size = 0.16", "size = 0.18"), "arm.npz was made with other size,"),
+    (("thickness = 0.08", "thickness = 0.09"), "arm.npz was made with other thickness,"),
+    (('mesh = "arm.npz"', 'mesh = "gone.npz"'), "gone.npz is missing,"),
+]
+
+
+@pytest.mark.parametrize(("change", "why"), STALE)
+def test_a_run_with_a_mesh_of_another_recipe_is_resumed_by_its_scene(
+    write: Write, tmp_path: Path, change: tuple[str, str], why: str
+) -> None:
+    named = ("size = 0.16", 'size = 0.16\nmesh = "arm.npz"')
+    (tmp_path / "arm.npz").write_bytes(scene_files(load_scene(write()))["flesh-arm.npz"])
+    fresh = load_scene(write(named))
+    assert list(stale_meshes(fresh, build(fresh).world.setup)) == []
+    scene, out = write(named, change), tmp_path / "run"
+    stale = load_scene(scene)
+    (warning,) = stale_meshes(stale, build(stale).world.setup)
+    assert warning.startswith(f"[[flesh]] 1: {why} so that each process meshes the flesh anew")
+    run(scene, out, frames=1, film=False)
+    kept = stale.flesh[0].kept_as
+    mesh = (out / kept).read_bytes()
+    flesh_room._made.clear()  # as in another process
+    assert run(scene, out, frames=2, film=False, resume=True).frames == 2
+    assert (out / kept).read_bytes() == mesh
+    # and the remedy works
+    (tmp_path / "new.npz").write_bytes(mesh)
+    mended = load_scene(scene, {"flesh.0.mesh": "'new.npz'"})
+    assert list(stale_meshes(mended, build(mended).world.setup)) == []
 
 
 def test_torn_flesh_stops_a_run_with_its_place(write: Write) -> None:

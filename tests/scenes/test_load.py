@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import re
 import tomllib
 from collections.abc import Callable
@@ -11,6 +12,7 @@ import pytest
 import tomli_w
 
 from flowborne.base.errors import SceneError
+from flowborne.characters.source import read_source
 from flowborne.scenes.load import (
     check_scene,
     library,
@@ -219,3 +221,17 @@ def test_a_name_that_leaves_the_run_folder_is_refused(tmp_path: Path, name: str)
         said = [one for one in problems if f"scene scene.toml{where}" in one]
         assert len(said) == 1, problems
         assert "a run calls its own folder or file by it. Take a name" in said[0]
+
+
+def test_a_folder_that_may_not_be_entered_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(path: Path) -> bool:
+        raise PermissionError(errno.EACCES, "Permission denied", str(path))
+
+    path = tmp_path / "scene.toml"
+    monkeypatch.setattr(Path, "is_file", refuse)
+    with pytest.raises(SceneError, match=rf"scene {path} cannot be read: Permission denied"):
+        load_scene(path)
+    with pytest.raises(SceneError, match=r"fish.glb cannot be read: Permission denied"):
+        read_source(tmp_path / "fish.glb")

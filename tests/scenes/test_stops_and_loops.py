@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from flowborne import Simulation
+from flowborne.base.errors import SceneError
 from flowborne.scenes.build import build
 from flowborne.scenes.load import check_scene, load_scene
 from flowborne.scenes.notes import notes_of
@@ -294,3 +295,21 @@ def test_what_contradicts_a_held_free_joint_is_refused(written: Written) -> None
     path.write_text(text)
     (problem,) = check_scene(path)
     assert "there is no free joint to hold as 'root'" in problem
+
+
+@pytest.mark.parametrize("hold", ["root", "free"])
+def test_an_actuator_on_a_held_root_is_refused(written: Written, hold: str) -> None:
+    """Held, it would not move, and the actuator's force would go nowhere."""
+    motor = '<actuator><motor name="pull" joint="free" gear="1 0 0 0 0 0"/></actuator></mujoco>'
+    model = FLOAT.format(joint=FREE).replace("</mujoco>", motor)
+    table = '[[actuator]]\nname = "pull"\nvalue = 1.0\n'
+    path = written(STREAM.format(hold="false") + table, model)
+    assert check_scene(path) == []
+    path = written(STREAM.format(hold=f'["{hold}"]') + table, model)
+    (problem,) = check_scene(path)
+    assert problem == (
+        f"scene {path.name}, [[actuator]] 1: 'pull' drives joint 'free', which is in [solids] hold "
+        "as well. Keep one of the two."
+    )
+    with pytest.raises(SceneError, match="'pull' drives joint 'free'"):
+        load_scene(path)

@@ -20,7 +20,7 @@ from flowborne.runs import recorder, run_folder
 from flowborne.runs.history import History
 from flowborne.runs.run_folder import RunFolder, RunFolderError
 from flowborne.sim import running
-from flowborne.sim.running import RunOutcome
+from flowborne.sim.endings import RunOutcome
 from flowborne.sim.simulation import Simulation
 
 from ..made_runs import numbers, run, start, summary_of, wait_for_rows
@@ -139,12 +139,20 @@ def test_a_kill_at_any_moment_and_resume_end_with_the_same_numbers(
         assert not list(out.rglob("*.partial")), f"killed at {moment}, then at {again}"
 
 
-def test_a_killed_run_in_a_flow_ends_with_the_same_numbers(tmp_path):
-    """A controlled chain in a fluid with dye: all of the state has to be in the checkpoint."""
-    settings = {"domain.resolution": "24", "time.frames": "8", "output.checkpoint_every": "3"}
-    scene = flowborne.load_scene("ns-chain-1", settings)
+KILLED = [
+    ("ns-chain-1", {"domain.resolution": "24"}, (32, 40)),
+    ("fish", {"domain.resolution": "12", "controller.every": "8"}, (35,)),
+]
+
+
+@pytest.mark.parametrize(("name", "settings", "moments"), KILLED)
+def test_a_killed_run_in_a_flow_ends_with_the_same_numbers(tmp_path, name, settings, moments):
+    """A controlled chain in a fluid with dye, and flesh: all of the state has to be in the
+    checkpoint, and the mesh in the folder."""
+    shorter = {"time.frames": "8", "output.checkpoint_every": "3"}
+    scene = flowborne.load_scene(name, settings | shorter)
     run(scene, tmp_path / "whole")
-    for moment in (32, 40):
+    for moment in moments:
         out = tmp_path / f"run-{moment}"
         assert killed_at(moment, lambda out=out: run(scene, out)) == signal.SIGKILL
         assert 0 < len(numbers(out)[0]) < 8

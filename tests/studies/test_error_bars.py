@@ -13,7 +13,7 @@ import pytest
 import flowborne as fb
 import flowborne.studies.error_bars as error_bars
 from flowborne import Refinement
-from flowborne.sim.running import RunOutcome
+from flowborne.sim.endings import RunOutcome
 
 from .conftest import MASS
 

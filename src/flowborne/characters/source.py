@@ -61,8 +61,11 @@ def read_source(path: Path) -> Source:
             f"{path.name} is none of {', '.join((*GLTF, *USD))}. Export the character in one of "
             "these formats."
         )
-    if not path.is_file():
-        raise SceneError(f"there is no file {path}. Correct its name.")
+    try:
+        if not path.is_file():
+            raise SceneError(f"there is no file {path}. Correct its name.")
+    except PermissionError as error:
+        raise SceneError(f"{path} cannot be read: {error.strerror}. Mend that.") from error
     if ending in GLTF:
         from flowborne.characters.gltf import GltfSource
 

@@ -1,7 +1,7 @@
 """Skins, weights and animations of UsdSkel, by usd-core, checked as they are read.
 
-As a program, it is the process in which `usd_gate.probe` reads a binary file first, because reading
-may crash.
+As a program, it is the process in which `usd_gate.probe` reads a file first, because reading
+may crash, or fill the memory.
 
 source  OpenUSD: UsdGeomMesh; UsdSkel schemas, binding API and SkelAnimation
 """
@@ -62,7 +62,7 @@ class UsdSource:
     """
 
     def __init__(self, path: Path, *, probed: bool = False) -> None:
-        """probed  whether to open binary files without a trial in another process"""
+        """probed  whether to open the file without a trial in another process"""
         self._name = path.name
         self._open(path, probed)
 

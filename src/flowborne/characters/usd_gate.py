@@ -34,16 +34,15 @@ PROBE_SECONDS = 300.0
 def open_stage(path: Path, *, probed: bool = False) -> Usd.Stage:
     """The stage of a file that is composed only of files in its folder.
 
-    probed  whether to open binary files directly; otherwise another process reads them first
+    probed  whether to open it directly; otherwise another process reads it first
     raises  SceneError when it cannot be read, is too large, or names a file elsewhere
     """
     folder, pending, known = path.parent.resolve(), [str(path)], {str(path)}
+    if not probed:
+        probe(path)
     while pending:
         own = pending.pop()
         where = path.name if own == str(path) else f"{path.name}, layer {Path(own).name}"
-        if not (probed or _is_text(own)):
-            probe(path)
-            probed = True
         layer = _layer(own, where)
         for reference in _named_files(layer):
             below = layer.ComputeAbsolutePath(reference)
@@ -110,15 +109,6 @@ def reading_usd(name: str) -> Iterator[None]:
         finally:
             os.dup2(kept, 2)
             os.close(kept)
-
-
-def _is_text(name: str) -> bool:
-    """Whether a layer is a text file, which usd-core parses instead of mapping it into memory."""
-    file = Path(name)
-    if not file.is_file():  # it is within a package
-        return False
-    with open(file, "rb") as opened:
-        return opened.read(5) == b"#usda"
 
 
 def _layer(name: str, where: str) -> Sdf.Layer:

@@ -10,7 +10,7 @@ from flowborne.base.phrases import listed
 from flowborne.runs.run_folder import RunFolder
 
 if TYPE_CHECKING:
-    from flowborne.sim.running import RunResult
+    from flowborne.sim.endings import RunResult
     from flowborne.studies.batch_page import Batch
 
 

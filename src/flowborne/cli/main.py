@@ -1,12 +1,13 @@
 """The command `flowborne`.
 
-Exit codes: 1 if a run blew up or could not be written, 2 for wrong input, 3 for a complete run
-with doubtful results and for `check --strict` with warnings, 130 after an interruption. Each error
-is one message on stderr.
+Exit codes: 1 if a run blew up, was stopped by an error or could not be written, 2 for wrong input,
+3 for a complete run with doubtful results and for `check --strict` with warnings, 130 after an
+interruption. Each error is one message on stderr.
 """
 
 from __future__ import annotations
 
+import logging
 import os
 import sys
 import warnings
@@ -33,6 +34,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         os.environ[name] = "1"
     if not sys.warnoptions:
         warnings.simplefilter("ignore")  # of libraries; errors have their own messages
+    logging.getLogger().addHandler(logging.NullHandler())  # what libraries log is not for stderr
     given = list(sys.argv[1:] if arguments is None else arguments)
     try:
         code = app(given or ["--help"], prog_name="flowborne", standalone_mode=False)
@@ -57,6 +59,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
         code = FAILED
     except Exception as error:
         log.debug("the error", exc_info=error)
-        complain(fault_of(error))
+        complain("; ".join([fault_of(error), *getattr(error, "__notes__", ())]))
         code = FAILED
     sys.exit(code if isinstance(code, int) else 0)

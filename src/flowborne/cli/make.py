@@ -83,7 +83,7 @@ def _run_one(
     folder = Path("runs") / loaded.name if out is None else out
     _say_if_not_drawn(given["film"])
     with ProgressDisplay() as progress:
-        from flowborne.sim.running import RunOutcome
+        from flowborne.sim.endings import RunOutcome
         from flowborne.sim.running import run as run_scene
 
         result = run_scene(loaded, folder, progress=progress, **given)

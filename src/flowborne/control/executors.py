@@ -60,6 +60,7 @@ class Pool:
         if self.workers < 1:
             raise ValueError(f"number of workers is {workers}: give at least 1")
         self._executor: Executor | None = None
+        self._process = 0
 
     def __reduce__(self) -> tuple[type[Pool], tuple[int]]:
         return type(self), (self.workers,)
@@ -68,11 +69,18 @@ class Pool:
         """Number of threads for the kernels of each of some tasks."""
         return max(1, allowed_threads() // max(1, min(self.workers, tasks)))
 
+    def executor(self, start: Callable[[], Executor]) -> Executor:
+        """That of this process. A fork has no threads of the process that it is of: it starts its
+        own."""
+        if self._executor is None or self._process != os.getpid():
+            self._executor, self._process = start(), os.getpid()
+        return self._executor
+
     def close(self) -> None:
         """Stop the workers; a later `map` starts new ones."""
-        if self._executor is not None:
+        if self._executor is not None and self._process == os.getpid():
             self._executor.shutdown()
-            self._executor = None
+        self._executor = None
 
 
 class Threads(Pool):
@@ -81,10 +89,9 @@ class Threads(Pool):
     def map(self, function: Callable[[Task], Answer], tasks: Sequence[Task]) -> list[Answer]:
         if self.workers == 1 or len(tasks) == 1:
             return [function(task) for task in tasks]
-        if self._executor is None:
-            self._executor = ThreadPoolExecutor(self.workers, thread_name_prefix="evaluation")
+        start = partial(ThreadPoolExecutor, self.workers, "evaluation")
         on_share = partial(run_on, self.share(len(tasks)), function)
-        return list(self._executor.map(on_share, tasks))
+        return list(self.executor(start).map(on_share, tasks))
 
 
 class Processes(Pool):
@@ -111,12 +118,11 @@ class Processes(Pool):
             ) from error
 
     def _map(self, function: Callable[[Task], Answer], tasks: Sequence[Task]) -> list[Answer]:
-        if self._executor is None:
-            spawn = multiprocessing.get_context("spawn")
-            self._executor = ProcessPoolExecutor(self.workers, spawn, end_with_parent)
+        spawn = multiprocessing.get_context("spawn")
+        start = partial(ProcessPoolExecutor, self.workers, spawn, end_with_parent)
         size = max(math.ceil(len(tasks) / self.workers), 1)
         on_share = partial(run_on, self.share(math.ceil(len(tasks) / size)), function)
-        return list(self._executor.map(on_share, tasks, chunksize=size))
+        return list(self.executor(start).map(on_share, tasks, chunksize=size))
 
 
 class Foreign(Mapper):

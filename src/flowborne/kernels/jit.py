@@ -53,6 +53,9 @@ LARGE = 100_000
 """Fewest elements of a kernel's largest array for which threads are started."""
 
 _thread = threading.local()
+_started_in: list[int] = []
+"""The process that started Numba's threads, once it has."""
+
 _workqueue = threading.Lock()
 """Held by the one thread that may use Numba's own layer, which aborts the process on a second."""
 
@@ -110,6 +113,7 @@ def numba_layer() -> str:
 
     Numba does not look for TBB where pip puts it, beside the environment's other libraries.
     """
+    _started_in.append(os.getpid())
     with suppress(OSError):
         ctypes.CDLL(os.path.join(sys.prefix, "lib", "libtbb.so.12"))
     numba.set_num_threads(numba.get_num_threads())
@@ -120,8 +124,12 @@ def numba_layer() -> str:
 def numba_threads(count: int) -> Iterator[bool]:
     """Within, Numba spreads `prange` over `count` threads; yields False where it cannot now.
 
-    Its layers TBB and OpenMP serve several threads of the process at once, its own only one.
+    Its layers TBB and OpenMP serve several threads of the process at once, its own only one. GNU's
+    OpenMP ends a fork of a process with threads of it.
     """
+    if numba_layer() == "omp" and _started_in[0] != os.getpid():
+        yield False
+        return
     shared = numba_layer() != "workqueue"
     before = numba.get_num_threads()
     numba.set_num_threads(min(count, numba.config.NUMBA_NUM_THREADS))

@@ -21,8 +21,9 @@ from flowborne.scenes.capture import capture_of, clip_motion
 from flowborne.scenes.changes import ChangeTable
 from flowborne.scenes.save import with_frames
 from flowborne.scenes.schema import Scene
+from flowborne.sim.endings import RunOutcome
 from flowborne.sim.frame import Snapshot
-from flowborne.sim.running import RunOutcome, run
+from flowborne.sim.running import run
 from flowborne.sim.simulation import Simulation
 from flowborne.solids.dynamics import kinematics
 from flowborne.view.run import PLOTTED, State

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flowborne.base.atomic import write_atomically
-from flowborne.base.given import read_arrays
+from flowborne.base.given import FileError, read_arrays
 from flowborne.coupling.world import Setup, World
 from flowborne.fluid.state import under
 from flowborne.solids.sensed import Sensed
@@ -37,7 +37,8 @@ def load_checkpoint(
     """The saved world of `setup`, its number of frames, and what its bodies and joints felt.
 
     memory  shapes of the controller's arrays; none without a controller
-    raises  ValueError when the file is not a checkpoint, or belongs to another setup
+    raises  ValueError when the file is not a checkpoint, or belongs to another setup; OSError when
+            it cannot be read
     """
     try:
         arrays = read_arrays(path)
@@ -49,7 +50,7 @@ def load_checkpoint(
         kept = Sensed.from_arrays(setup.solid, world.solid.q, felt) if felt else None
     except KeyError as error:
         raise ValueError(f"{path} is not a checkpoint of this scene (it lacks {error})") from error
-    except (OSError, TypeError, ValueError) as error:
+    except (FileError, TypeError, ValueError) as error:
         raise ValueError(f"{path} is not a checkpoint of this scene ({error})") from error
     return world, int(frame), kept
 

@@ -13,6 +13,8 @@ preview.mp4      the film
 
 from __future__ import annotations
 
+import errno
+import json
 import os
 import re
 import shutil
@@ -25,7 +27,7 @@ from filelock import FileLock, Timeout
 
 from flowborne.base.atomic import partial_name, write_json
 from flowborne.base.errors import SceneError
-from flowborne.base.given import possible_name, read_json, read_toml
+from flowborne.base.given import FileError, possible_name, read_json, read_toml
 from flowborne.base.version import __version__
 
 MARK = "flowborne"
@@ -143,9 +145,7 @@ class RunFolder:
         """Raise RunFolderError unless the run here can be resumed."""
         self.check_links()
         if not os.access(self.path, os.W_OK):
-            raise RunFolderError(
-                f"{self.path} cannot be written; give yourself the right to write it"
-            )
+            raise RunFolderError(f"{self.path} cannot be written; make it and its files writable")
 
     def check_links(self) -> None:
         """Raise RunFolderError where something in the folder is a symbolic link.
@@ -188,9 +188,11 @@ class RunFolder:
         self.check_links()
 
     def is_run(self) -> bool:
-        """Whether a run has made this folder."""
+        """Whether a run has made this folder. Raises RunFolderError if it may not be read."""
         try:
             summary = read_json(self.summary)
+        except PermissionError:
+            raise RunFolderError(f"{self.summary} cannot be read; make it readable") from None
         except (OSError, ValueError):
             return False
         return isinstance(summary, dict) and MARK in summary
@@ -208,6 +210,24 @@ class RunFolder:
 
     def write_summary(self, summary: dict[str, Any]) -> None:
         write_json(self.summary, {MARK: __version__, **summary})
+
+    def mark_ended(self, outcome: str, message: str) -> None:
+        """Say in summary.json how a run ended, on a disc without room for another file: over its
+        present content, which keeps its block. Raises OSError where even that cannot be written."""
+        before = self.summary.read_bytes()
+        ended = {"outcome": outcome, "message": message, "model_files": self.model_files()}
+        content = json.dumps({MARK: __version__, **ended}, ensure_ascii=False).encode()
+        with open(self.summary, "r+b", buffering=0) as file:
+            try:
+                written = file.write(content)
+                if written < len(content):
+                    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+                file.truncate()
+            except OSError:
+                file.seek(0)
+                file.write(before)
+                file.truncate()
+                raise
 
     def read_summary(self) -> dict[str, Any]:
         summary: dict[str, Any] = read_json(self.summary)
@@ -302,10 +322,17 @@ def reading(folder: Path) -> Iterator[None]:
     except UNREADABLE as error:
         first = error.problems[0] if isinstance(error, SceneError) else str(error)
         said = f"it lacks {first}" if isinstance(error, KeyError) else first.rstrip(".")
-        raise RunFolderError(
-            f"the files of run {folder} cannot be read ({said}); start the run again with "
-            "replace=True"
-        ) from error
+        said, remedy = f"{folder} cannot be read ({said})", "start the run again with replace=True"
+        if not is_damage(error.__cause__ or error):
+            remedy = "make them readable"
+        elif isinstance(error, SceneError):
+            remedy = f"correct that, or if they are damaged {remedy}"
+        raise RunFolderError(f"the files of run {said}; {remedy}") from error
+
+
+def is_damage(error: BaseException) -> bool:
+    """Whether a file of a run is damaged or gone, and the system does not just refuse it."""
+    return not isinstance(error, OSError) or isinstance(error, FileNotFoundError | FileError)
 
 
 def _is_possible(name: str) -> bool:
@@ -328,6 +355,12 @@ def check_name(path: Path) -> None:
 def cannot_write(path: Path, error: OSError) -> RunFolderError:
     """The error to raise when the system refuses to write into `path`."""
     return RunFolderError(f"{path} cannot be written ({error.strerror}); name another folder")
+
+
+def write_remedy(error: Exception) -> str:
+    """What to do where the system refuses to read or write the files of a run."""
+    full = getattr(error, "errno", 0) in (errno.ENOSPC, errno.EDQUOT)
+    return "make room" if full else "make the folder and its files readable and writable"
 
 
 def make_folder(path: Path) -> None:

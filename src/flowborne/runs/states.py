@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from flowborne.base.given import check_file, read_arrays, said_of
 from flowborne.fluid.grid import Grid
 from flowborne.kernels.arrays import Array, Real, Single
-from flowborne.runs.run_folder import RunFolder, RunFolderError
+from flowborne.runs.run_folder import RunFolder, RunFolderError, is_damage
 
 IN_EVERY_STATE = "geom_position", "geom_rotation", "fluid_centre", "fluid_force"
 """Arrays of every state, which are needed to draw it."""
@@ -158,10 +158,9 @@ def check_states(folder: RunFolder, frame: int) -> None:
 
 
 def _unreadable(path: Path, error: Exception) -> RunFolderError:
-    return RunFolderError(
-        f"state {path} cannot be read ({said_of(error)}); remove it, and films and exports go on "
-        "without its frame"
-    )
+    remedy = "remove it, and films and exports go on without its frame"
+    remedy = remedy if is_damage(error) else "make it readable"
+    return RunFolderError(f"state {path} cannot be read ({said_of(error)}); {remedy}")
 
 
 def cell_velocity(grid: Grid, state: Arrays) -> Single:

@@ -16,7 +16,7 @@ from flowborne.motion.formula import Formula
 from flowborne.motion.tracks import Curve
 from flowborne.solids.actuators import actuator_servos, unusable_actuator
 from flowborne.solids.model import SolidModel
-from flowborne.solids.motors import driven_by, inputs_of, moved_by
+from flowborne.solids.motors import inputs_of, joint_of, moved_by
 
 
 class ActuatorTable(Table):
@@ -105,13 +105,11 @@ def check_actuators(
                 f"{where}: '{table.name}' has {inputs.stop - inputs.start} controls, and a table "
                 "gives one. Tell it by a [policy] or a script."
             )
-        for dof in driven_by(model, number)[:1]:
-            joint = model.joint_names[model.mj.dof_jntid[dof]]
-            if joint in moved:
-                yield (
-                    f"{where}: '{table.name}' drives joint '{joint}', which is {moved[joint]} as "
-                    "well. Keep one of the two."
-                )
+        if (joint := joint_of(model, number)) is not None and joint in moved:
+            yield (
+                f"{where}: '{table.name}' drives joint '{joint}', which is {moved[joint]} as well. "
+                "Keep one of the two."
+            )
 
 
 def unknown_actuators(names: Sequence[str], around: Surroundings) -> Iterator[str]:

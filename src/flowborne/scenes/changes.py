@@ -45,6 +45,15 @@ def values_at(
     return values
 
 
+def plain(value: Any) -> Any:
+    """The same in Python's own numbers and lists, as in a file, in place of arrays of NumPy."""
+    if isinstance(value, Mapping):
+        return {key: plain(part) for key, part in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(part) for part in value]
+    return value.tolist() if hasattr(value, "tolist") else value
+
+
 def blended(before: Any, after: Any, part: float) -> Any:
     """Between two numbers or lists of them; `after` where they are none."""
     if part == 1.0:

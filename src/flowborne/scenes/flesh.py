@@ -11,6 +11,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
+from flowborne.base.phrases import listed
 from flowborne.base.tables import FileName, NotNegative, Places, PlainName, Positive, Table, Text
 from flowborne.scenes.domain import Domain
 from flowborne.scenes.sides import BoundariesTable
@@ -30,7 +31,7 @@ from flowborne.solids.tissue.mesh import (
     skin_mesh,
     surface_mesh,
 )
-from flowborne.solids.tissue.mesh_file import read_mesh, recipe_of
+from flowborne.solids.tissue.mesh_file import ENDING, read_mesh, recipe_of
 from flowborne.solids.tissue.surface_file import surface_bytes
 from flowborne.solids.tissue.symmetry import SAME
 
@@ -52,8 +53,9 @@ class FleshTable(Table):
     size       m: length of the elements' edges. One element through its thickness is enough for
                flesh to bend as it should
     mesh       file (.npz as a run leaves it, or .vtu) of elements that were made of all this
-               before: made anew where it was made otherwise. Without a thickness and a surface it
-               is used as it is, in two dimensions a mesh of triangles at z = 0
+               before. Where it was made otherwise, each process meshes anew and differently, and a
+               run keeps the mesh that it began with; `check` says so. Without a thickness and a
+               surface it is used as it is, in two dimensions a mesh of triangles at z = 0
     young      N/m^2, Young's modulus
     poisson    Poisson's ratio
     density    kg/m^3
@@ -88,6 +90,11 @@ class FleshTable(Table):
         """Whether it is meshed, and no mesh of the user's own."""
         return self.thickness is not None or self.surface is not None
 
+    @property
+    def kept_as(self) -> str:
+        """Name of the file in which a run keeps its mesh."""
+        return Path(self.mesh or f"flesh-{self.name}").with_suffix(ENDING).name
+
     def tissue(self) -> Tissue:
         """The material."""
         return Tissue(self.young, self.poisson, self.density, self.damping, LAWS[self.law])
@@ -114,10 +121,9 @@ def meshed(spec: MjSpec, table: FleshTable, folder: Path) -> tuple[FleshMesh, st
     raises  ValueError as `grow`
     """
     recipe = _recipe(spec, table, folder)
-    if table.mesh is not None:
+    if table.mesh is not None and staleness(spec, table, folder) is None:
         path = folder / table.mesh
-        if not table.is_made or (path.exists() and recipe_of(path) == recipe):
-            return _read(path, path.stat().st_mtime_ns if path.exists() else 0), recipe
+        return _read(path, path.stat().st_mtime_ns if path.exists() else 0), recipe
     if recipe not in _made:
         assert table.size is not None
         if table.surface is not None:
@@ -128,6 +134,26 @@ def meshed(spec: MjSpec, table: FleshTable, folder: Path) -> tuple[FleshMesh, st
         _made[recipe] = made
     return _made[recipe], recipe
 
+
+def staleness(spec: MjSpec, table: FleshTable, folder: Path) -> str | None:
+    """Why the file of a mesh that a flesh names is not used, after the name of the file; None where
+    it is used or none is named. Raises ValueError for a file that cannot be read."""
+    if table.mesh is None or not table.is_made:
+        return None
+    path, recipe = folder / table.mesh, _recipe(spec, table, folder)
+    if not path.exists():
+        return "is missing"
+    if (found := recipe_of(path)) == recipe:
+        return None
+    if not found:
+        return "does not say what it was made of"
+    before, wanted = json.loads(found), json.loads(recipe)
+    other = [WORDS.get(key, key) for key in wanted if before.get(key) != wanted[key]]
+    return f"was made with other {listed(other)}"
+
+
+WORDS = {"shapes": "shapes of the bones", "rules": "rules of the mesher"}
+"""What entries of a recipe are called in messages, where it is not by their key."""
 
 _made: dict[str, FleshMesh] = {}
 """Meshes of this process by recipe."""

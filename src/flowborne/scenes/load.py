@@ -210,6 +210,8 @@ def find(name_or_path: str | Path) -> Path:
             return path
         if path.is_dir():
             raise SceneError(f"scene {text} is a folder. Give the TOML file in it.")
+    except PermissionError as error:
+        raise SceneError(f"scene {text} cannot be read: {error.strerror}. Mend that.") from error
     except (OSError, ValueError):
         raise SceneError(f"{text[:60]} ... is no name of a file. Shorten it.") from None
     if path.suffix == ".toml" or path.parent != Path():
@@ -225,7 +227,7 @@ def read_tables(path: Path, kind: str = "scene") -> dict[str, Any]:
         content = read_file(path).decode("utf-8-sig")
         return tomllib.loads(content)
     except OSError as error:
-        raise SceneError(f"{kind} {path} cannot be read: {error.strerror}. Mend that.") from None
+        raise SceneError(f"{kind} {path} cannot be read: {error.strerror}. Mend that.") from error
     except UnicodeDecodeError as error:
         raise SceneError(
             f"{kind} {path.name}: byte {error.start + 1} is not UTF-8 text. Save it as UTF-8."

@@ -75,9 +75,9 @@ class PolicyTable(Table):
             told = ((others, "joints, actuators or thrusters"), (pushed, "bodies"))
             for names, what in told:
                 if names:
+                    unnamed = ", ".join(sorted(map(str, names)))
                     raise PartError(
-                        f"policy '{self.function}' tells {', '.join(sorted(names))}: name it in "
-                        f"{what} of [policy]"
+                        f"policy '{self.function}' tells {unnamed}: name it in {what} of [policy]"
                     )
             return commands
 

@@ -19,12 +19,12 @@ from flowborne.scenes.bodies import bones_of, packages_of
 from flowborne.scenes.capture import human_of
 from flowborne.scenes.draft import explain
 from flowborne.scenes.earlier import EARLIER_FILE, earlier_of
-from flowborne.scenes.flesh import FleshTable, meshed
+from flowborne.scenes.flesh import FleshTable, meshed, staleness
 from flowborne.scenes.load import load_scene, override
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.schema_film import FilmTable
 from flowborne.solids.model_files import ASSETS, gathered
-from flowborne.solids.tissue.mesh_file import ENDING, mesh_bytes
+from flowborne.solids.tissue.mesh_file import mesh_bytes
 
 SCENE_FILE = "scene.toml"
 HUMAN_FILE = "human.xml"
@@ -90,15 +90,16 @@ def scene_files(scene: Scene) -> dict[str, bytes]:
 
 
 def with_meshes_of(scene: Scene, earlier: Scene) -> Scene:
-    """The same scene with the meshes of its flesh from an earlier run where it names none."""
+    """The same scene with the meshes of its flesh from an earlier run where it has none to use."""
     known = {table.name: table.mesh for table in earlier.flesh if table.mesh is not None}
-    tables = tuple(
-        table.model_copy(update={"mesh": str(earlier.folder.resolve() / known[table.name])})
-        if table.mesh is None and table.name in known
-        else table
-        for table in scene.flesh
-    )
-    return scene.model_copy(update={"flesh": tables})
+    spec, tables = bones_of(scene) if scene.flesh else None, []
+    for table in scene.flesh:
+        unused = table.mesh is None or staleness(spec, table, scene.folder) is not None
+        if unused and table.name in known:
+            path = earlier.folder.resolve() / known[table.name]
+            table = table.model_copy(update={"mesh": str(path)})
+        tables.append(table)
+    return scene.model_copy(update={"flesh": tuple(tables)})
 
 
 def _flesh_files(scene: Scene, named: Named) -> tuple[tuple[FleshTable, ...], dict[str, bytes]]:
@@ -106,8 +107,7 @@ def _flesh_files(scene: Scene, named: Named) -> tuple[tuple[FleshTable, ...], di
     spec, files, tables = bones_of(scene), {}, []
     for table in scene.flesh:
         mesh, recipe = meshed(spec, table, scene.folder)
-        own = Path(table.mesh or f"flesh-{table.name}").with_suffix(ENDING)
-        changed = {"mesh": named(str(own))}
+        changed = {"mesh": named(table.kept_as)}
         files[changed["mesh"]] = mesh_bytes(mesh, recipe)
         if table.surface is not None:
             changed["surface"] = named(table.surface)

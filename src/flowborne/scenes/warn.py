@@ -17,9 +17,10 @@ from flowborne.control.objective_kinds import ObjectiveInputMotionTable
 from flowborne.coupling.world import TRIAL_TOLERANCE, Setup
 from flowborne.motion.clip_reading import MIN_STANDING_COSINE, standing_axis
 from flowborne.motion.tracks import SPEED_SAMPLES
-from flowborne.scenes.bodies import held_joints, left_free, undriven
+from flowborne.scenes.bodies import bones_of, held_joints, left_free, undriven
 from flowborne.scenes.build import surroundings_of
 from flowborne.scenes.capture import capture_of
+from flowborne.scenes.flesh import staleness
 from flowborne.scenes.motions import ServoPDTable
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.warn_bodies import (
@@ -157,6 +158,17 @@ def lying(scene: Scene, setup: Setup) -> Iterator[str]:
         )
 
 
+def stale_meshes(scene: Scene, setup: Setup) -> Iterator[str]:
+    """Meshes that flesh names and that were not made of it."""
+    for number, table in enumerate(scene.flesh, start=1):
+        if why := staleness(bones_of(scene), table, scene.folder):
+            yield (
+                f"[[flesh]] {number}: {table.mesh} {why}, so that each process meshes the flesh "
+                "anew, differently, and a run keeps the mesh that it began with; copy "
+                f"{table.kept_as} from the folder of a run to the scene, and name it as mesh"
+            )
+
+
 Warn = Callable[[Scene, Setup], Iterator[str]]
 """Warnings of one kind about a scene and what was built of it."""
 
@@ -185,6 +197,7 @@ WARNINGS: tuple[Warn, ...] = (
     too_slow,
     limp_joints,
     holding_nothing,
+    stale_meshes,
     soft_stops,
     past_stops,
     lying,

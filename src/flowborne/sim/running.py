@@ -3,12 +3,8 @@
 from __future__ import annotations
 
 import logging
-import signal
-import threading
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
-from dataclasses import asdict, dataclass
-from enum import Enum
+from contextlib import ExitStack, suppress
+from dataclasses import asdict
 from math import prod
 from pathlib import Path
 from time import perf_counter
@@ -17,14 +13,23 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from flowborne.base.arguments import COUNT, PATH, PROGRESS, or_none, takes
-from flowborne.base.errors import PartError, SceneError, WorkerError
+from flowborne.base.errors import PartError, SceneError, described
 from flowborne.base.extras import missing_to_draw
+from flowborne.base.given import said_of
 from flowborne.base.progress import Progress, RunProgress, Stage, displayed
 from flowborne.kernels.jit import compilation_watched
 from flowborne.runs.checkpoint import load_checkpoint, save_checkpoint, state_bytes
 from flowborne.runs.history import History
 from flowborne.runs.recorder import Recorder, write_model
-from flowborne.runs.run_folder import RunFolder, RunFolderError, cannot_write, check_space
+from flowborne.runs.run_folder import (
+    UNREADABLE,
+    RunFolder,
+    RunFolderError,
+    cannot_write,
+    check_space,
+    is_damage,
+    write_remedy,
+)
 from flowborne.runs.states import check_states
 from flowborne.runs.strained import strained
 from flowborne.runs.summary import doubts_of, peak_memory, summarise, versions
@@ -36,10 +41,10 @@ from flowborne.scenes.notes import notes_of
 from flowborne.scenes.save import scene_to_resume, with_frames, write_scene
 from flowborne.scenes.seen import seen_bodies
 from flowborne.scenes.warn import accepted_of, warnings_of
+from flowborne.sim.endings import RunInterrupted, RunOutcome, RunResult, stopped
 from flowborne.sim.frame import PARTS, FrameReport, Snapshot
+from flowborne.sim.signals import Signals
 from flowborne.sim.simulation import BlowUpError, Simulation
-from flowborne.view.embedded import run_html
-from flowborne.view.open_run import OpenRun
 
 if TYPE_CHECKING:
     from flowborne.scenes.schema import Scene
@@ -48,59 +53,6 @@ log = logging.getLogger("flowborne")
 
 FILM_BYTES = 20_000_000
 """Disc space reserved for the picture, the film and the history."""
-
-
-class RunOutcome(Enum):
-    """How a run ended, as a sentence."""
-
-    DONE = "the run is complete"
-    DOUBTFUL = "the run is complete, and its numbers are in doubt"
-    BLEW_UP = "the simulation blew up"
-    NOT_WRITTEN = "the run could not be written any further"
-    INTERRUPTED = "the run was interrupted"
-
-
-COMPLETE = (RunOutcome.DONE.name.lower(), RunOutcome.DOUBTFUL.name.lower())
-"""Outcomes of runs with all frames, as in their summaries."""
-
-
-@dataclass(frozen=True)
-class RunResult:
-    """Result of a run.
-
-    folder   of the run
-    outcome  how it ended
-    message  for the user
-    frames   frames done, including those of earlier runs in the same folder
-    summary  content of summary.json
-    """
-
-    folder: Path
-    outcome: RunOutcome
-    message: str
-    frames: int
-    summary: dict[str, Any]
-
-    def __repr__(self) -> str:
-        return f"RunResult in {self.folder}: {self.outcome.value}, {self.frames} frames"
-
-    def _repr_html_(self) -> str:
-        return run_html(repr(self), self.folder)
-
-    def open(self) -> OpenRun:
-        """The run, to read, plot and view it."""
-        return OpenRun(self.folder)
-
-
-class RunInterrupted(KeyboardInterrupt):
-    """The run was interrupted; everything up to its last whole frame is saved.
-
-    result  of the run so far
-    """
-
-    def __init__(self, result: RunResult) -> None:
-        super().__init__(result.message)
-        self.result = result
 
 
 @takes(out=PATH, frames=or_none(COUNT), workers=or_none(COUNT), progress=or_none(PROGRESS))
@@ -125,11 +77,14 @@ def run(
     replace   replace an earlier run in `out`
     film      draw preview.png and preview.mp4 at the end
     progress  called with the progress of the run; True shows it as the command line does
-    returns   the result, also of a run that blew up or filled the disc: see its outcome
+    returns   the result, also of a run that blew up, filled the disc or was stopped by a policy or
+              another part of its scene: see its outcome
     raises    RunFolderError if `out` cannot be used or another run is being written there,
               SceneError if the scene or an argument is wrong, or it does not fit into memory;
               nothing is then written. RunInterrupted (a KeyboardInterrupt) after Ctrl-C or SIGTERM,
-              when everything has been saved; KeyboardInterrupt if there was nothing to save yet
+              when everything has been saved; KeyboardInterrupt if there was nothing to save yet.
+              What `progress` raises, with a note on the frame and how to continue, when everything
+              has been saved
     """
     from flowborne.scenes.load import scene_of
     from flowborne.scenes.save import scene_files
@@ -144,7 +99,7 @@ def run(
     else:
         folder.check_new(replace=replace)
     wanted = with_frames(wanted, frames)
-    with folder.locked(), _Signals() as signals, ExitStack() as open_until_the_end:
+    with folder.locked(), Signals() as signals, ExitStack() as open_until_the_end:
         show = open_until_the_end.enter_context(displayed(progress))
         try:
             with signals.interruptible():
@@ -163,7 +118,12 @@ def run(
             job.resume()
         else:
             job.begin(replace=replace)
-        return job.finish(*job.go_on(), film=film)
+        try:
+            ended = job.go_on()
+        except BaseException as error:  # of progress, or a fault of flowborne
+            error.add_note(job.finish(*job.broken_off(error), film=False).message)
+            raise
+        return job.finish(*ended, film=film)
 
 
 class _Run:
@@ -174,7 +134,7 @@ class _Run:
         simulation: Simulation,
         folder: RunFolder,
         files: dict[str, bytes],
-        signals: _Signals,
+        signals: Signals,
         progress: Progress | None,
     ) -> None:
         self.simulation = simulation
@@ -188,6 +148,7 @@ class _Run:
         self.columns = (*simulation.columns.names, *(f"seconds_{p}" for p in ("total", *PARTS)))
         self.recorder = Recorder(folder)
         self.history: History | None = None
+        self._recorded: Snapshot | None = None  # state of the last row
         self._signals = signals
         self._progress = progress
         self._started = perf_counter()
@@ -199,16 +160,17 @@ class _Run:
         try:
             write_scene(self.folder, self.files)
             self._write_start()
-        except SceneError:
-            self.folder.remove()
-            raise
         except OSError as error:
             self.folder.remove()
             raise cannot_write(self.folder.path, error) from error
+        except BaseException:
+            self.folder.remove()
+            raise
 
     def resume(self) -> None:
         """Restore the checkpoint, and drop everything written after it."""
         folder, simulation = self.folder, self.simulation
+        ended = folder.read_summary()
         try:
             if folder.checkpoint.exists():
                 controller, setup = simulation.controller, simulation.setup
@@ -228,13 +190,20 @@ class _Run:
                 return
             self.history = History.reopen(folder.history, self.columns, simulation.frame)
             folder.drop_states_after(simulation.frame)
+            self._recorded = simulation.snapshot()
         except (OSError, ValueError) as error:
-            raise RunFolderError(
-                f"{folder.path} cannot be resumed: {error}; start again with replace=True"
-            ) from error
+            remedy = "start again with replace=True"
+            if not is_damage(error):
+                remedy = f"{write_remedy(error)}, then the same command resumes it"
+                with suppress(OSError):
+                    folder.write_summary(ended)
+            raise RunFolderError(f"{folder.path} cannot be resumed: {error}; {remedy}") from error
 
     def go_on(self) -> tuple[RunOutcome, str]:
-        """Advance and record to the last frame, or until the run stops; outcome and message."""
+        """Advance and record to the last frame, or until the run stops; outcome and message.
+
+        raises  what `progress` raises, and faults of flowborne
+        """
         simulation, signals = self.simulation, self._signals
         self.show("start")
         while simulation.frame < self.frames and not signals.asked:
@@ -245,10 +214,12 @@ class _Run:
                 if simulation.report is None or simulation.frame == self._rows():
                     break
                 report = simulation.report
-            except BlowUpError as error:
-                return RunOutcome.BLEW_UP, self._blown_up(error)
+            except (BlowUpError, MemoryError, SceneError) as error:
+                return self._stopped(error)
             try:
                 values = self._record(report)
+            except MemoryError as error:
+                return self._stopped(error)
             except OSError as error:
                 return RunOutcome.NOT_WRITTEN, self._not_written(error)
             joints = tuple((c, values[c]) for c in simulation.columns.controlled)
@@ -258,31 +229,59 @@ class _Run:
         except OSError as error:
             return RunOutcome.NOT_WRITTEN, self._not_written(error)
         if simulation.frame < self.frames:
-            return RunOutcome.INTERRUPTED, f"stopped after frame {simulation.frame}; {self._how()}"
+            return self._interrupted()
         message, doubts = f"{simulation.frame} frames are in {self.folder.path}", self._doubts()
         if not doubts:
             return RunOutcome.DONE, message
         return RunOutcome.DOUBTFUL, f"{message}, but not to be trusted: {'. '.join(doubts)}"
 
+    def broken_off(self, error: BaseException) -> tuple[RunOutcome, str]:
+        """Save the last whole frame after what `go_on` raised; outcome and message."""
+        kept = self._keep()
+        if isinstance(error, KeyboardInterrupt):
+            return self._interrupted()
+        cause = f"the run stopped after frame {self._rows()} ({described(error)})"
+        return RunOutcome.FAILED, f"{cause}; {kept}; {self._how()}"
+
     def finish(self, outcome: RunOutcome, message: str, *, film: bool) -> RunResult:
-        """Write exports, summary and film; the result. Raises RunInterrupted after a signal."""
+        """Write summary, exports and film; the result. Raises RunInterrupted after a signal."""
         assert self.history is not None
         self.history.close()
         folder = self.folder
-        exported: list[str] = []
         whole = outcome in (RunOutcome.DONE, RunOutcome.DOUBTFUL)
-        if whole:
-            exported, failed = self._export()
-            message += failed
-        summary = self._summary(outcome, message)
-        summary["model_files"] += exported
+        facts: dict[str, Any] = {}
+        try:
+            facts = self._facts()
+        except (MemoryError, *UNREADABLE) as error:  # the files are gone
+            log.debug("no summary", exc_info=error)
+            if whole:
+                outcome, whole = RunOutcome.FAILED, False
+                message += f", but cannot be read ({said_of(error)})"
+        summary = {
+            "scene": self.simulation.scene.name,
+            "outcome": outcome.name.lower(),
+            "message": message,
+            **facts,
+            "versions": versions(),
+            "model_files": folder.model_files(),
+        }
         try:
             folder.write_summary(summary)
-            if film and (whole or outcome is RunOutcome.BLEW_UP):
+            if whole and self.simulation.scene.output.exports:
+                exported, failed = self._export()
+                message += failed
+                summary |= {"message": message}
+                summary["model_files"] += exported
+                folder.write_summary(summary)
+            if film and outcome not in (RunOutcome.NOT_WRITTEN, RunOutcome.INTERRUPTED):
                 message += self._draw()
         except OSError as error:
             if whole:
                 outcome, message = RunOutcome.NOT_WRITTEN, self._not_written(error)
+            try:
+                folder.mark_ended(outcome.name.lower(), message)
+            except OSError:
+                message += "; summary.json could not be written and has an earlier state"
         result = RunResult(folder.path, outcome, message, self.simulation.frame, summary)
         if outcome is RunOutcome.INTERRUPTED or self._signals.asked:
             raise RunInterrupted(result)
@@ -295,6 +294,7 @@ class _Run:
             return f"; no film: {missing}"
         from flowborne.view.film import make_preview
 
+        how = f"draw with: flowborne film {self.folder.path}"
         try:
             with self._signals.interruptible():
                 make_preview(
@@ -303,8 +303,10 @@ class _Run:
                 )
         except (RunFolderError, ValueError) as error:
             return f"; no film: {error}"
+        except MemoryError:
+            return f"; no film: the memory is full; {how}"
         except KeyboardInterrupt:
-            return f"; stopped while drawing; draw with: flowborne film {self.folder.path}"
+            return f"; stopped while drawing; {how}"
         return ""
 
     def _export(self) -> tuple[list[str], str]:
@@ -322,6 +324,8 @@ class _Run:
                 exported += (str(file.relative_to(self.folder.path)) for file in written.files)
             except (OSError, PartError, RunFolderError, SceneError) as error:
                 failed += f"; no {table.file}: {error}"
+            except MemoryError:
+                failed += f"; no {table.file}: the memory is full"
             except KeyboardInterrupt:
                 how = f"flowborne export {self.folder.path} --out {out}"
                 failed += f"; stopped before {table.file} was written; write it with: {how}"
@@ -334,10 +338,14 @@ class _Run:
         folder.drop_states_after(-1)
         self.history = History.create(folder.history, self.columns)
         self.recorder.write(0, simulation.world, None)
+        self._recorded = simulation.snapshot()
         self._save()
 
     def _record(self, report: FrameReport) -> dict[str, float]:
-        """Write a frame: its row, its state, and a checkpoint when one is due."""
+        """Write a frame: its row, its state, and a checkpoint when one is due.
+
+        raises  OSError and MemoryError; unless the checkpoint failed, nothing of the frame is left
+        """
         assert self.history is not None
         simulation = self.simulation
         values = simulation.measure()
@@ -349,6 +357,7 @@ class _Run:
         except BaseException:
             self.history.drop_last(length)
             raise
+        self._recorded = simulation.snapshot()
         if report.frame % simulation.scene.output.checkpoint_every == 0:
             self._save()
         return values
@@ -368,7 +377,8 @@ class _Run:
         needed = states + 2 * state_bytes(simulation.world) + FILM_BYTES
         check_space(self.folder.path, needed - freed)
 
-    def _summary(self, outcome: RunOutcome, message: str) -> dict[str, Any]:
+    def _facts(self) -> dict[str, Any]:
+        """What the summary says of scene, history and states."""
         simulation = self.simulation
         world, scene = simulation.world, simulation.scene
         strength = simulation.columns.strength_steps(simulation.frame_time)
@@ -376,9 +386,6 @@ class _Run:
         creature = creature_of(scene, world.setup)
         cells = None if world.setup.fluid is None else prod(world.setup.fluid.grid.shape)
         return {
-            "scene": scene.name,
-            "outcome": outcome.name.lower(),
-            "message": message,
             "doubts": self._doubts(),
             **summarise(self.folder.history, strength, every),
             "objective_unit": self.unit,
@@ -390,45 +397,33 @@ class _Run:
             "state_bytes": state_bytes(world),
             "bytes_per_cell": None if cells is None else state_bytes(world) / cells,
             "peak_memory_bytes": peak_memory(),
-            "versions": versions(),
-            "model_files": self.folder.model_files(),
         }
 
-    def _blown_up(self, error: BlowUpError) -> str:
-        """Save the last good frame; returns the message."""
-        kept = f"everything up to frame {self.simulation.frame} is kept"
+    def _interrupted(self) -> tuple[RunOutcome, str]:
+        return RunOutcome.INTERRUPTED, f"stopped after frame {self._rows()}; {self._how()}"
+
+    def _keep(self) -> str:
+        """Save the last frame that has been recorded; a part of the message."""
+        if self.simulation.frame > self._rows() and self._recorded is not None:
+            self.simulation.restore(self._recorded)
+        kept = f"everything up to frame {self._rows()} is kept"
         try:
             self._save()
-        except OSError as full:
-            kept += f", but its checkpoint could not be written ({full.strerror})"
-        log.debug("the blow-up", exc_info=error)
-        if isinstance(error.__cause__, PartError | WorkerError):
-            return f"the run stopped in {error}; {kept}; then {self._how()}"
-        if error.fault:
-            return (
-                f"the run stopped in {error}; {kept}; try more steps per frame. If that does not "
-                "help, it is a fault of flowborne: flowborne --debug run shows where"
-            )
-        return f"the simulation blew up in {error}; {kept}; {self._remedy()}"
+        except (MemoryError, OSError) as error:
+            said = getattr(error, "strerror", None) or "the memory is full"
+            kept += f", but its checkpoint could not be written ({said})"
+        return kept
 
-    def _remedy(self) -> str:
-        """What may keep the run from blowing up."""
-        world, report = self.simulation.world, self.simulation.report
-        fluid = world.setup.fluid
-        if fluid is None or report is None or not any(step.contacts for step in report.steps):
-            return "try more steps per frame"
-        return (
-            "bodies touched in the fluid, which squeezes it out between them: give their geoms a "
-            f"contact margin of a cell, margin = {fluid.grid.spacing:.2g} m in the model, or try "
-            "more steps per frame"
-        )
+    def _stopped(self, error: BlowUpError | MemoryError | SceneError) -> tuple[RunOutcome, str]:
+        """Save the last whole frame after an error in the next one; outcome and message."""
+        log.debug("the end of the run", exc_info=error)
+        return stopped(error, self.simulation, self.folder, self._keep(), self._how())
 
     def _not_written(self, error: OSError) -> str:
-        return (
-            f"writing into {self.folder.path} failed after frame {self._rows()} "
-            f"({error.strerror or error}); what was written before is kept; make room, then "
-            f"{self._how()}"
-        )
+        """Save the last recorded frame if that is possible; the message."""
+        failed = f"writing into {self.folder.path} failed after frame {self._rows()}"
+        why, remedy = error.strerror or error, write_remedy(error)
+        return f"{failed} ({why}); {self._keep()}; {remedy}, then {self._how()}"
 
     def _doubts(self) -> list[str]:
         """Reasons not to trust the frames so far, including those of earlier runs in the folder."""
@@ -456,51 +451,6 @@ class _Run:
         news = {"frame": self.simulation.frame, "frames": self.frames, **news}
         seconds, warnings = perf_counter() - self._started, len(self.warnings)
         self._progress(RunProgress(stage=stage, seconds=seconds, warnings=warnings, **news))
-
-
-class _Signals:
-    """Ctrl-C and SIGTERM during a run: recorded, and raised only where that is safe.
-
-    asked  whether one has arrived
-    """
-
-    def __init__(self) -> None:
-        self.asked = False
-        self._safe = False
-        self._earlier: dict[signal.Signals, Any] = {}
-
-    def __enter__(self) -> _Signals:
-        if threading.current_thread() is threading.main_thread():
-            for number in (signal.SIGINT, signal.SIGTERM):
-                self._earlier[number] = signal.signal(number, self._note)
-        return self
-
-    def __exit__(self, *raised: object) -> None:
-        for number, handler in self._earlier.items():
-            signal.signal(number, handler)
-
-    def _note(self, number: int, frame: object) -> None:
-        self.asked = True
-        if self._safe:
-            self._safe = False
-            raise KeyboardInterrupt
-
-    @contextmanager
-    def interruptible(self) -> Iterator[None]:
-        """Context that a signal ends by KeyboardInterrupt, also one that arrived before."""
-        if self.asked:
-            raise KeyboardInterrupt
-        self._safe = True
-        try:
-            yield
-        except Exception as error:
-            # an interrupt becomes a SystemError while a kernel returns its result, and a
-            # TypingError while Numba compiles it
-            if not self.asked:
-                raise
-            raise KeyboardInterrupt from error
-        finally:
-            self._safe = False
 
 
 def write_state_alone(folder: RunFolder, simulation: Simulation) -> None:

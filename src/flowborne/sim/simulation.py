@@ -37,9 +37,10 @@ from flowborne.kernels.faces import is_finite
 from flowborne.kernels.jit import LARGE, cores, kernel_threads
 from flowborne.runs.summary import BUDGET_OPEN
 from flowborne.scenes.actuators import joints_of_actuators, scene_controls
-from flowborne.scenes.changes import ChangeTable, values_at
+from flowborne.scenes.changes import ChangeTable, plain, values_at
 from flowborne.sim.columns import Columns
 from flowborne.sim.frame import PARTS, FrameReport, Snapshot
+from flowborne.sim.turn import Turn
 from flowborne.solids.flesh import inversion
 from flowborne.solids.model import FREE, turning_dofs
 from flowborne.solids.motors import activations_of, driven_by, outputs_of
@@ -144,6 +145,7 @@ class Simulation:
         self._policy = None if policy is None else policy.build()
         self._moment = Snapshot(built.world, 0, None)
         self._started = False
+        self._turn = Turn()
         self._step: Step = step
 
     def __repr__(self) -> str:
@@ -198,9 +200,10 @@ class Simulation:
         """
         from flowborne.scenes.load import with_values
 
-        with_values(self.scene, values)
+        change = ChangeTable(time=self.time, over=over, values=plain(values))
+        with_values(self.scene, change.values)
         earlier = (change for change in self._changes if change.time <= self.time)
-        self._changes = (*earlier, ChangeTable(time=self.time, over=over, values=dict(values)))
+        self._changes = (*earlier, change)
 
     def snapshot(self) -> Snapshot:
         """The state now. A frame makes a new one, so it costs nothing to keep."""
@@ -235,22 +238,19 @@ class Simulation:
                   Control; and a Force by a name of its own. The scene's motions and its controller
                   move the other joints. By default the scene's policy tells
         raises    BlowUpError if a step or the policy fails or a measure is not a finite number;
-                  SceneError for a wrong command. After any error the state is that before the frame
+                  SceneError for a wrong command; RuntimeError while another thread advances it.
+                  After any error the state is that before the frame
         """
+        with self._turn:
+            return self._next_frame(commands)
+
+    def _next_frame(self, commands: Commands | None) -> FrameReport:
         self._apply_changes()
         world = self.world.copy()
         splits = self.report is not None and self.report.step.added_mass.done
         if splits != world.setup.splits:  # asked for once, asked for again
             world.setup = world.setup.but(splits=splits)
-        if commands is None and self._policy is not None:
-            try:
-                commands = self._policy(self)
-            except PartError as error:
-                raise BlowUpError(self.frame + 1, 1, str(error)) from error
-        beyond: tuple[str, ...] = ()
-        commands = self._with_controls({} if commands is None else commands)
-        if commands:
-            world.told, beyond = told_by(commands, world, self.frame_time, self._drives())
+        beyond = self._command(world, commands)
         with _one_blas_thread(), kernel_threads(_threads(world.setup)):
             report = self._advance(world, self.frame + 1, beyond)
         world.told = NOTHING_TOLD
@@ -329,6 +329,25 @@ class Simulation:
         from flowborne.scenes.load import raw_of
 
         return raw_of(self.scene)
+
+    def _command(self, world: World, commands: Commands | None) -> tuple[str, ...]:
+        """Give the world commands for the frame, by default those of the policy; what was beyond
+        limits. Raises as `advance_frame`."""
+        policy = self.scene.policy if commands is None else None
+        try:
+            if policy is not None and self._policy is not None:
+                commands = self._policy(self)
+            if not (commands := self._with_controls(commands or {})):
+                return ()
+            world.told, beyond = told_by(commands, world, self.frame_time, self._drives())
+            return beyond
+        except PartError as error:
+            raise BlowUpError(self.frame + 1, 1, str(error)) from error
+        except SceneError as error:
+            if policy is None:
+                raise
+            cause = f"policy '{policy.function}': {error}"
+            raise BlowUpError(self.frame + 1, 1, cause) from error
 
     def _with_controls(self, commands: Commands) -> Commands:
         """Commands with the scene's [[actuator]]s, but for those that they tell otherwise."""

@@ -114,13 +114,19 @@ def activations_of(model: SolidModel, actuator: int) -> slice:
     return slice(first, first + int(model.mj.actuator_actnum[actuator]))
 
 
+def joint_of(model: SolidModel, actuator: int) -> str | None:
+    """The joint that an actuator acts on; None for one on a tendon, a site or a body."""
+    if int(model.mj.actuator_trntype[actuator]) not in ON_JOINT:
+        return None
+    return model.joint_names[model.mj.actuator_trnid[actuator, 0]]
+
+
 def driven_by(model: SolidModel, actuator: int) -> Integers:
     """Dofs of the joint that an actuator acts on; none of a free joint, or of other actuators."""
-    on_joint = int(model.mj.actuator_trntype[actuator]) in ON_JOINT
-    joint = int(model.mj.actuator_trnid[actuator, 0])
-    if not on_joint or model.mj.jnt_type[joint] == FREE:
+    joint = joint_of(model, actuator)
+    if joint is None or model.mj.jnt_type[model.joint(joint)] == FREE:
         return np.zeros(0, np.int64)
-    return model.dofs_of(model.joint_names[joint])
+    return model.dofs_of(joint)
 
 
 def moved_by(model: SolidModel, actuator: int) -> Integers:

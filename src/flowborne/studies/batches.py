@@ -29,7 +29,8 @@ from flowborne.scenes.control import ControllerTable
 from flowborne.scenes.load import load_scene
 from flowborne.scenes.save import scene_to_resume, with_frames
 from flowborne.scenes.schema import Scene
-from flowborne.sim.running import COMPLETE, run
+from flowborne.sim.endings import COMPLETE
+from flowborne.sim.running import run
 from flowborne.studies.batch_page import PAGE, Batch, ClipRun, is_own_page, write_page
 
 log = logging.getLogger("flowborne")

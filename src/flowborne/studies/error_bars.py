@@ -17,7 +17,8 @@ from flowborne.base.errors import PartError, SceneError
 from flowborne.kernels.arrays import Array
 from flowborne.scenes.load import load_scene
 from flowborne.scenes.schema import Scene
-from flowborne.sim.running import RunOutcome, run
+from flowborne.sim.endings import RunOutcome
+from flowborne.sim.running import run
 from flowborne.view.open_run import OpenRun
 
 FORMAL_ORDER = 2.0

@@ -28,7 +28,8 @@ from flowborne.runs.history import history_columns, read_history
 from flowborne.runs.run_folder import RunFolder, RunFolderError, reading
 from flowborne.scenes.load import load_scene
 from flowborne.scenes.save import scene_files
-from flowborne.sim.running import COMPLETE, RunOutcome, run
+from flowborne.sim.endings import COMPLETE, RunOutcome
+from flowborne.sim.running import run
 
 FAILED = "failed"
 """Outcome of a member without a run: its scene is wrong, or its process died."""

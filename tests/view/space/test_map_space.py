@@ -15,7 +15,7 @@ import flowborne
 from flowborne.fluid.grid import Grid
 from flowborne.kernels.arrays import Pixels
 from flowborne.scenes.schema_film import CameraTable
-from flowborne.sim.running import RunOutcome
+from flowborne.sim.endings import RunOutcome
 from flowborne.view import style
 from flowborne.view.film import make_preview
 from flowborne.view.pictures import Picture

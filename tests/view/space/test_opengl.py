@@ -12,7 +12,7 @@ import pytest
 
 import flowborne
 from flowborne.cli.main import main
-from flowborne.sim.running import RunOutcome
+from flowborne.sim.endings import RunOutcome
 from flowborne.view.space import opengl
 
 MISSING = "neither libEGL nor libOSMesa works here; install OpenGL"
