@@ -114,7 +114,7 @@ CALLS: dict[str, Callable[[Given, Any], Any]] = {
     "state": lambda g, v: g.run.state(v),
     "every": lambda g, v: g.run.every(v),
     "export's run": lambda g, v: fb.export(v, "a.csv"),
-    "export's parameters": lambda g, v: fb.export(g.folder / "run", "a.glb", v),
+    "export's parameters": lambda g, v: fb.export(g.folder / "run", g.folder / "a.glb", v),
     "file": lambda g, v: fb.import_character(v, g.folder),
     "density of a character": lambda g, v: fb.import_character("a.glb", g.folder, density=v),
     "study": lambda g, v: fb.study(v, g.folder),
