@@ -5,14 +5,14 @@ BIN := $(VENV)/bin
 # Every process would compile the package anew, a fifth of what it takes to start.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: baselines closeness demo lint test browser dist docs gltf-validator imports failing same-figures gallery paper exporters fuzz messages size strangers validation-page clean
+.PHONY: baselines blender closeness demo lint test browser dist docs gltf-validator imports failing same-figures gallery paper exporters fuzz messages size strangers validation-page clean
 
 demo: $(VENV)/installed
 	$(BIN)/flowborne run ns-block-drag-max --out runs/ns-block-drag-max --replace
 
 lint: $(VENV)/installed-test
-	$(BIN)/ruff check src validation tests tools docs
-	$(BIN)/ruff format --check src validation tests tools docs
+	$(BIN)/ruff check src validation blender tests tools docs
+	$(BIN)/ruff format --check src validation blender tests tools docs
 	$(BIN)/mypy
 
 test: lint
@@ -22,6 +22,11 @@ browser: $(VENV)/installed-test
 	$(BIN)/python -m pip install --quiet --editable '.[browser]'
 	command -v chromium || $(BIN)/playwright install --with-deps chromium
 	FLOWBORNE_SCREENSHOTS=runs/viewer $(BIN)/pytest -rs -m browser --numprocesses 0 tests/view/browser
+
+blender: $(VENV)/installed-test
+	test -x build/bpy/bin/python || $(PYTHON) -m venv build/bpy
+	build/bpy/bin/python -m pip install --quiet 'bpy==5.0.*'
+	FLOWBORNE_BPY=build/bpy/bin/python $(BIN)/pytest -m blender --numprocesses 0 tests/blender
 
 dist: $(VENV)/installed-test
 	$(BIN)/python tools/dist.py
