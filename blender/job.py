@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 from collections.abc import Sequence
@@ -151,12 +152,23 @@ class Job:
 
     @property
     def seconds_left(self) -> float | None:
-        """Estimate from the frames so far; None before there are two."""
-        if self._pace is None or self.frames_done <= self._pace[1]:
+        """Estimate from the frames so far; None before there are two, or when nothing runs."""
+        if self.state is not State.RUNNING or self._pace is None:
             return None
         since, first = self._pace
+        if self.frames_done <= first:
+            return None
         left = self.reaction.frames - self.frames_done
         return (monotonic() - since) / (self.frames_done - first) * left
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Warnings about the scene of the run, such as bodies that are thinner than two cells."""
+        try:
+            summary = json.loads((self.run / "summary.json").read_text(encoding="utf-8"))
+            return tuple(map(str, summary.get("warnings", ())))
+        except (OSError, ValueError):
+            return ()
 
     def _prepare(self) -> None:
         try:

@@ -276,6 +276,8 @@ class FlowbornePanel(bpy.types.Panel):
             return
         for line in line_of(job).split("\n"):
             layout.label(text=line, icon="ERROR" if job.state is State.FAILED else "NONE")
+        for warning in job.warnings:
+            layout.label(text=warning, icon="ERROR")
         if job.state in ACTIVE:
             layout.operator(FlowborneCancel.bl_idname)
         elif job.state is not State.DONE:

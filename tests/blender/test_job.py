@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import sys
 import time
 from pathlib import Path
@@ -30,7 +31,7 @@ time.sleep(60)
 def new_job(folder: Path, engine: tuple[str, ...] = ENGINE, **settings: object) -> Job:
     folder.mkdir()
     rigged.write_glb(folder / CHARACTER)
-    given = {"cones": {}, "first": 11, "frames": 12, "rate": 24.0, "flow": (0.0, 6.0, 0.0)}
+    given = {"cones": {}, "first": 11, "frames": 36, "rate": 24.0, "flow": (0.0, 6.0, 0.0)}
     return Job(engine, folder, Reaction(("tail",), **given | settings))
 
 
@@ -59,19 +60,25 @@ def test_a_job_is_cancelled_resumed_and_the_same(tmp_path: Path) -> None:
     whole.start()
     with pytest.raises(JobError, match="the run is in progress"):
         whole.start()
+    assert whole.warnings == ()
     assert finish(whole) is State.DONE, whole.message
-    assert whole.frames_done == 12
+    assert whole.frames_done == 36
+    assert whole.seconds_left is None
+    assert whole.warnings == ()
     motion = read_motion(whole.run)
     assert motion.moving == ("handle", "tail")
     tail, trunk = motion.of("tail")[1], motion.of("trunk")[1]
     assert np.abs(np.swapaxes(trunk, 1, 2) @ tail - trunk[0].T @ tail[0]).max() > 0.05
 
-    parts = new_job(tmp_path / "parts", cones={"tail": 30.0})
+    shutil.copytree(whole.folder, tmp_path / "parts", ignore=shutil.ignore_patterns("run"))
+    parts = Job.load(ENGINE, tmp_path / "parts")
+    assert parts.state is State.NEW
     parts.start()
-    while not parts.frames_done:
-        assert parts.step() in ACTIVE, parts.message
+    left = None
+    while left is None and parts.step() in ACTIVE:
+        left = parts.seconds_left
+    assert left is None or 0.0 < left < 300.0
     parts.cancel()
-    assert parts.state is State.STOPPING
     ended = finish(parts)
     assert ended in (State.CANCELLED, State.DONE)
     again = Job.load(ENGINE, parts.folder)
@@ -80,7 +87,7 @@ def test_a_job_is_cancelled_resumed_and_the_same(tmp_path: Path) -> None:
     again.start()
     assert finish(again) is State.DONE, again.message
     assert states(again) == states(whole)
-    assert fb.open_run(again.run).history["frame"].tolist() == list(range(1, 13))
+    assert fb.open_run(again.run).history["frame"].tolist() == list(range(1, 37))
 
 
 def test_a_child_that_does_not_end_is_killed(
@@ -114,7 +121,7 @@ def test_what_the_engine_says_is_the_message(tmp_path: Path) -> None:
     assert finish(silent) is State.FAILED
     assert silent.message == "flowborne ended with code 7"
     tip = new_job(tmp_path / "tip")
-    tip.reaction = Reaction(("tail_tip",), {}, 1, 12, 24.0)
+    tip.reaction = Reaction(("tail_tip",), {}, 1, 36, 24.0)
     tip.start()
     assert finish(tip) is State.FAILED
     assert "bone 'tail_tip' moves nothing of its own" in tip.message

@@ -1,20 +1,22 @@
 """The extension installs from its zip, and is disabled, enabled and reloaded without a trace."""
 
 import os
-import zipfile
+import subprocess
+import sys
 from pathlib import Path
 
 import blender
 from stage import FOLDER, bpy, message
 
-FILES = sorted(Path(blender.__file__).parent.iterdir())
 NAME = "bl_ext.user_default.flowborne"
 
-archive = FOLDER / "flowborne.zip"
-with zipfile.ZipFile(archive, "w") as made:
-    for path in FILES:
-        if path.is_file():
-            made.write(path, path.name)
+(builder,) = Path(bpy.utils.system_resource("SCRIPTS")).rglob("blender_ext.py")
+source, archive = Path(blender.__file__).parent, FOLDER / "flowborne.zip"
+for command in (
+    ("build", "--source-dir", source, "--output-filepath", archive),
+    ("validate", archive),
+):
+    subprocess.run([sys.executable, builder, *command], check=True)
 assert Path(bpy.utils.user_resource("EXTENSIONS")).is_relative_to(
     os.environ["BLENDER_USER_RESOURCES"]
 )
