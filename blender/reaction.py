@@ -21,8 +21,19 @@ UP = (0.0, 0.0, 1.0)
 CHECKPOINT_FRAMES = 8
 """Frames between checkpoints, and at most that many are computed again after a cancel."""
 
-PROBE = 1.0
-"""Displacement of a trial, degrees."""
+SERVO = {
+    "velocities": "present",
+    "hypothetical_time": 0.05,
+    "servo": {"kind": "pd", "frequency": 4.0},
+}
+
+IN_WIND = SERVO | {"rule": {"kind": "golden-section", "tolerance": 0.1}}
+IN_FLOW = SERVO | {"gradient": {"kind": "one-sided"}, "rule": {"kind": "resilient"}}
+"""[controller]. A trial in a simulated flow solves for the flow: half as many trials per decision,
+and no search along the gradient, take a quarter of the time."""
+
+PROBES = 1.0, 5.0
+"""Displacement of a trial in a uniform wind and in a simulated flow, degrees."""
 
 
 class ReactionError(Exception):
@@ -133,7 +144,7 @@ def scene_of(imported: Mapping[str, Any], reaction: Reaction, root: str) -> dict
     root  name of the character's free joint
     """
     scene = {key: value for key, value in imported.items() if key not in ("initial", "output")}
-    time = dict(scene["time"])
+    time, probe = dict(scene["time"]), PROBES[reaction.simulated]
     if reaction.simulated:
         domain = dict(scene["domain"])
         sides = [high - low for low, high in zip(domain["lower"], domain["upper"], strict=True)]
@@ -153,14 +164,9 @@ def scene_of(imported: Mapping[str, Any], reaction: Reaction, root: str) -> dict
         "gravity": reaction.gravity,
         "time": time | {"frames_per_second": reaction.rate, "frames": reaction.frames},
         "clip": scene["clip"] | {"loop": False, "free": [root] if reaction.floats else []},
-        "control": [{"joints": reaction.bones, "strength": reaction.strength, "probe": PROBE}],
+        "control": [{"joints": reaction.bones, "strength": reaction.strength, "probe": probe}],
         "objectives": [*_objectives(reaction)],
-        "controller": {
-            "velocities": "present",
-            "hypothetical_time": 0.05,
-            "rule": {"kind": "golden-section", "tolerance": 0.1},
-            "servo": {"kind": "pd", "frequency": 4.0},
-        },
+        "controller": IN_FLOW if reaction.simulated else IN_WIND,
         "output": {"checkpoint_every": CHECKPOINT_FRAMES},
     }
 
