@@ -2,6 +2,11 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
+# Blender's Python: `make blender BPY=5.3.0 BLENDER_PYTHON=python3.13`
+BPY ?= 5.0.1
+BLENDER_PYTHON ?= python3.11
+BPY_VENV := build/bpy-$(BPY)
+
 # Every process would compile the package anew, a fifth of what it takes to start.
 unexport PYTHONDONTWRITEBYTECODE
 
@@ -24,9 +29,9 @@ browser: $(VENV)/installed-test
 	FLOWBORNE_SCREENSHOTS=runs/viewer $(BIN)/pytest -rs -m browser --numprocesses 0 tests/view/browser
 
 blender: $(VENV)/installed-test
-	test -x build/bpy/bin/python || $(PYTHON) -m venv build/bpy
-	build/bpy/bin/python -m pip install --quiet 'bpy==5.0.*'
-	FLOWBORNE_BPY=build/bpy/bin/python $(BIN)/pytest -m blender --numprocesses 0 tests/blender
+	test -x $(BPY_VENV)/bin/python || $(BLENDER_PYTHON) -m venv $(BPY_VENV)
+	$(BPY_VENV)/bin/python -m pip install --quiet bpy==$(BPY)
+	FLOWBORNE_BPY=$(BPY_VENV)/bin/python $(BIN)/pytest -m blender --numprocesses 0 tests/blender
 
 dist: $(VENV)/installed-test
 	$(BIN)/python tools/dist.py

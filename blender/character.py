@@ -144,8 +144,10 @@ def export_character(context: Any, armature: Any, path: Path) -> None:
     """Write armature, meshes and animation of the scene's frame range as a .glb file.
 
     Modifiers other than the armature's are applied. Selection, mode and frame stay as they are.
-    raises  ReactionError when there is no mesh
+    raises  ReactionError when the armature is hidden, or no mesh is visible
     """
+    if not armature.visible_get():
+        raise ReactionError(f"armature '{armature.name}' is hidden: show it for the export")
     meshes = meshes_of(context, armature)
     path.parent.mkdir(parents=True, exist_ok=True)
     with _ready(context, armature, meshes):

@@ -28,7 +28,7 @@ class Motion:
     """The bones in the frames of a run.
 
     names     (n) of the bones
-    moving    names of those that move by a joint; the others are rigid with their parent
+    moving    names of those that have a joint, the root first; others are rigid with their parent
     position  (frames, n, 3) m
     rotation  (frames, n, 3, 3) from the axes of the bone to the world's
     """

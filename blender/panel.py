@@ -203,7 +203,7 @@ class FlowborneBake(bpy.types.Operator):
     bones: EnumProperty(
         name="Bones",
         items=[
-            ("FREE", "Free Bones", "Those that the run decides"),
+            ("FREE", "Free Bones", "Those that forces and objectives move, a floating root too"),
             ("SELECTED", "Selected Bones", "Selected in Pose Mode"),
             ("ALL", "All Bones", "All that the run moves"),
         ],
@@ -215,7 +215,7 @@ class FlowborneBake(bpy.types.Operator):
             job = job_of(armature.flowborne, engine_of(context))
             motion = read_motion(job.run)
             chosen = {
-                "FREE": job.reaction.bones,
+                "FREE": [*motion.moving[: job.reaction.floats], *job.reaction.bones],
                 "SELECTED": [bone.name for bone in armature.pose.bones if bone.select],
                 "ALL": motion.moving,
             }[self.bones]

@@ -26,6 +26,9 @@ assert "needs a flow" in said(str(python), ReactionError)
 rig.flowborne.objective = "effort"
 bpy.data.objects["rig body"].hide_set(True)
 assert "no visible mesh is bound to armature 'rig'" in said(str(python), ReactionError)
+bpy.data.objects["rig body"].hide_set(False)
+rig.hide_set(True)
+assert "armature 'rig' is hidden" in said(str(python), ReactionError)
 bpy.context.scene.frame_end = bpy.context.scene.frame_start
 assert "the frame range is empty" in said(str(python), ReactionError)
 assert "this armature has no run" in refusal(rig)
