@@ -2,17 +2,22 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
+# Blender's Python: `make blender BPY=5.3.0 BLENDER_PYTHON=python3.13`
+BPY ?= 5.0.1
+BLENDER_PYTHON ?= python3.11
+BPY_VENV := build/bpy-$(BPY)
+
 # Every process would compile the package anew, a fifth of what it takes to start.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: baselines chapters closeness demo lint test browser dist docs gltf-validator imports failing films same-figures gallery paper exporters fuzz messages size speed strangers validation-page clean
+.PHONY: baselines chapters closeness demo lint test browser dist docs gltf-validator imports failing films same-figures gallery paper exporters fuzz messages size speed strangers validation-page clean blender
 
 demo: $(VENV)/installed
 	$(BIN)/flowborne run ns-block-drag-max --out runs/ns-block-drag-max --replace
 
 lint: $(VENV)/installed-test
-	$(BIN)/ruff check src validation tests tools docs
-	$(BIN)/ruff format --check src validation tests tools docs
+	$(BIN)/ruff check src validation blender tests tools docs
+	$(BIN)/ruff format --check src validation blender tests tools docs
 	$(BIN)/mypy
 
 test: lint
@@ -22,6 +27,11 @@ browser: $(VENV)/installed-test
 	$(BIN)/python -m pip install --quiet --editable '.[browser]'
 	command -v chromium || $(BIN)/playwright install --with-deps chromium
 	FLOWBORNE_SCREENSHOTS=runs/viewer $(BIN)/pytest -rs -m browser --numprocesses 0 tests/view/browser
+
+blender: $(VENV)/installed-test
+	test -x $(BPY_VENV)/bin/python || $(BLENDER_PYTHON) -m venv $(BPY_VENV)
+	$(BPY_VENV)/bin/python -m pip install --quiet bpy==$(BPY)
+	FLOWBORNE_BPY=$(BPY_VENV)/bin/python $(BIN)/pytest -m blender --numprocesses 0 tests/blender
 
 dist: $(VENV)/installed-test
 	$(BIN)/python tools/dist.py

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import ast
+import sys
+import tomllib
 from dataclasses import replace
+from importlib.metadata import packages_distributions
 from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 from scipy.spatial import KDTree
 from scipy.spatial.transform import Rotation
 
@@ -400,3 +406,20 @@ def one_hand() -> tuple[Rig, Surface]:
     surface = Surface(vertices @ Z_UP.T, faces, weights, grey)
     rig, order = one_tree(flat, heaviest(surface))
     return rig, replace(surface, weights=weights[:, order])
+
+
+def test_the_base_has_every_library_of_an_import() -> None:
+    """Pillow came with the extra film alone, and an import failed without it."""
+    root = Path(__file__).parents[2]
+    project = tomllib.loads((root / "pyproject.toml").read_text())["project"]
+    base = {canonicalize_name(Requirement(line).name) for line in project["dependencies"]}
+    used = set[str]()
+    for path in (root / "src" / "flowborne" / "characters").glob("[!u]*.py"):  # USD is an extra
+        for line in ast.parse(path.read_text()).body:
+            named = line.names if isinstance(line, ast.Import) else []
+            modules = [line.module] if isinstance(line, ast.ImportFrom) else [n.name for n in named]
+            used |= {module.partition(".")[0] for module in modules if module}
+    owners = packages_distributions()
+    outside = used - sys.stdlib_module_names - {"flowborne"}
+    needed = {canonicalize_name(owners[name][0]) for name in outside}
+    assert {"numpy", "pillow", "pydantic", "scipy"} <= needed <= base

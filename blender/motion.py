@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The motion of bones in a run folder, and their rotations as Blender keeps them.
+
+A body of the run has the name and the axes of its bone, in world axes with z up, as in Blender.
+"""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class MotionError(Exception):
+    """A run cannot be baked; the text says why and what to do."""
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """The bones in the frames of a run.
+
+    names     (n) of the bones
+    moving    names of those that have a joint, the root first; others are rigid with their parent
+    position  (frames, n, 3) m
+    rotation  (frames, n, 3, 3) from the axes of the bone to the world's
+    """
+
+    names: tuple[str, ...]
+    moving: tuple[str, ...]
+    position: Array
+    rotation: Array
+
+    def of(self, bone: str) -> tuple[Array, Array]:
+        """(frames, 3) m and (frames, 3, 3) of a bone."""
+        number = self.names.index(bone)
+        return self.position[:, number], self.rotation[:, number]
+
+    def check(self, bones: Iterable[str]) -> None:
+        """Raise MotionError for a bone that the run does not move."""
+        for bone in bones:
+            if bone not in self.moving:
+                raise MotionError(
+                    f"the run does not move bone '{bone}'. Select some of: {', '.join(self.moving)}"
+                )
+
+
+def read_motion(run: Path) -> Motion:
+    """The motion of a run, complete or not.
+
+    raises  MotionError when there is no frame, or a file cannot be read
+    """
+    try:
+        model: dict[str, Any] = json.loads((run / "model.json").read_text(encoding="utf-8"))
+        states = [_read(path) for path in sorted((run / "states").glob("[0-9]*.npz"))]
+        if not states:
+            raise ValueError("it has no states")
+        position, rotation = (np.array(values, np.float64) for values in zip(*states, strict=True))
+        return Motion(tuple(model["bodies"]), tuple(model["joints"]), position, rotation)
+    except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
+        raise MotionError(f"{run} has no frames to bake ({error}): resume the run") from error
+
+
+def _read(path: Path) -> tuple[Array, Array]:
+    with np.load(path) as state:
+        return state["body_position"], state["body_rotation"]
+
+
+def basis(world: Array, above: Array, rest: Array, rest_above: Array) -> Array:
+    """(frames, 3, 3) rotation of a pose bone relative to its rest pose, in its own axes.
+
+    world       (frames, 3, 3) bone's axes to the world's
+    above       (frames, 3, 3) those of its parent, or of the armature for a bone without one
+    rest        (3, 3) bone's axes to the armature's, in the rest pose
+    rest_above  (3, 3) those of its parent, the identity without one
+    """
+    return np.swapaxes(above @ (rest_above.T @ rest), -1, -2) @ world
+
+
+def shift(position: Array, places: Array, rest: Array, head: Array) -> Array:
+    """(frames, 3) location of a pose bone without a parent, in units of Blender.
+
+    position  (frames, 3) of its head in the world, in units of Blender
+    places    (frames, 4, 4) armature's axes to the world's
+    rest      (3, 3) bone's axes to the armature's, in the rest pose
+    head      (3,) of the bone in the armature, in the rest pose
+    """
+    apart = (position - places[:, :3, 3])[..., None]
+    return np.asarray(((np.linalg.inv(places[:, :3, :3]) @ apart)[..., 0] - head) @ rest)
+
+
+def axes_only(matrices: Array) -> Array:
+    """(..., 3, 3) rotations of matrices (..., 3, 3) or (..., 4, 4) with uniform scale."""
+    inner = matrices[..., :3, :3]
+    return np.asarray(inner / np.linalg.norm(inner, axis=-2, keepdims=True))
+
+
+def same_side(quaternions: Array) -> Array:
+    """Quaternions (frames, 4) with the signs that keep each near the one before."""
+    products = np.sum(quaternions[1:] * quaternions[:-1], axis=1)
+    signs = np.cumprod(np.where(products < 0.0, -1.0, 1.0))
+    return quaternions * np.concatenate([[1.0], signs])[:, None]
+
+
+def turns(quaternions: Array) -> Array:
+    """(frames, 4) angle, rad, and axis of quaternions (frames, 4), without jumps.
+
+    The angle may exceed half a turn, and the axis is kept through the rest pose.
+    """
+    near = same_side(quaternions)
+    near = near if near[0, 0] >= 0.0 else -near
+    sines = np.linalg.norm(near[:, 1:], axis=1)
+    found = np.empty_like(near)
+    axis = np.array([0.0, 1.0, 0.0])  # Blender's axis of a bone at rest
+    for k, (quaternion, sine) in enumerate(zip(near, sines, strict=True)):
+        if sine > 0.0:
+            new = quaternion[1:] / sine
+            axis = -new if k and new @ axis < 0.0 else new
+        found[k] = 2.0 * np.arctan2(quaternion[1:] @ axis, quaternion[0]), *axis
+    found[:, 0] = np.unwrap(found[:, 0])
+    return found

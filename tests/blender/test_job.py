@@ -1,0 +1,145 @@
+"""Jobs of the Blender extension: a child process that is stepped, without Blender."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from blender.job import ACTIVE, CHARACTER, Job, JobError, State, engine_command
+from blender.motion import read_motion
+from blender.reaction import Reaction
+
+import flowborne as fb
+from blender import job as jobs
+
+from ..characters import rigged
+
+ENGINE = sys.executable, "-m", "flowborne"
+
+STUBBORN = """
+import signal, sys, time
+signal.signal(signal.SIGTERM, signal.SIG_IGN)
+print("ready", flush=True)
+time.sleep(60)
+"""
+
+
+def new_job(folder: Path, engine: tuple[str, ...] = ENGINE, **settings: object) -> Job:
+    folder.mkdir()
+    rigged.write_glb(folder / CHARACTER)
+    given = {"cones": {}, "first": 11, "frames": 36, "rate": 24.0, "flow": (0.0, 6.0, 0.0)}
+    return Job(engine, folder, Reaction(("tail",), **given | settings))
+
+
+def finish(job: Job) -> State:
+    until = time.monotonic() + 300.0
+    while job.step() in ACTIVE:
+        assert time.monotonic() < until, "the job does not end"
+        time.sleep(0.01)
+    return job.state
+
+
+def wait_for(job: Job, text: str) -> None:
+    while text not in (job.folder / "log.txt").read_text():
+        assert job.step() in ACTIVE, job.message
+        time.sleep(0.01)
+
+
+def states(job: Job) -> list[bytes]:
+    return [path.read_bytes() for path in sorted((job.run / "states").iterdir())]
+
+
+def test_a_job_is_cancelled_resumed_and_the_same(tmp_path: Path) -> None:
+    """The frames after a cancel and a restart of Blender are those of a run in one piece."""
+    whole = new_job(tmp_path / "whole", cones={"tail": 30.0})
+    assert whole.state is State.NEW
+    whole.start()
+    with pytest.raises(JobError, match="the run is in progress"):
+        whole.start()
+    assert whole.warnings == ()
+    assert finish(whole) is State.DONE, whole.message
+    assert whole.frames_done == 36
+    assert whole.seconds_left is None
+    assert whole.warnings == ()
+    motion = read_motion(whole.run)
+    assert motion.moving == ("handle", "tail")
+    tail, trunk = motion.of("tail")[1], motion.of("trunk")[1]
+    assert np.abs(np.swapaxes(trunk, 1, 2) @ tail - trunk[0].T @ tail[0]).max() > 0.05
+
+    shutil.copytree(whole.folder, tmp_path / "parts", ignore=shutil.ignore_patterns("run"))
+    parts = Job.load(ENGINE, tmp_path / "parts")
+    assert parts.state is State.NEW
+    parts.start()
+    left = None
+    while left is None and parts.step() in ACTIVE:
+        left = parts.seconds_left
+    assert left is None or 0.0 < left < 300.0
+    parts.cancel()
+    ended = finish(parts)
+    assert ended in (State.CANCELLED, State.DONE)
+    again = Job.load(ENGINE, parts.folder)
+    assert again.state is ended
+    assert again.reaction == parts.reaction
+    again.start()
+    assert finish(again) is State.DONE, again.message
+    assert states(again) == states(whole)
+    assert fb.open_run(again.run).history["frame"].tolist() == list(range(1, 37))
+
+
+def test_a_child_that_does_not_end_is_killed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(jobs, "GRACE_SECONDS", 0.1)
+    job = new_job(tmp_path / "job", (sys.executable, "-c", STUBBORN))
+    job.start()
+    wait_for(job, "ready")
+    job.cancel()
+    assert finish(job) is State.CANCELLED
+    assert job.frames_done == 0
+    job.start()
+    wait_for(job, "ready")
+    job.close()
+    assert job.step() is State.CANCELLED
+
+
+def test_what_the_engine_says_is_the_message(tmp_path: Path) -> None:
+    job = new_job(tmp_path / "job")
+    (job.folder / CHARACTER).write_bytes(b"nothing")
+    job.start()
+    assert finish(job) is State.FAILED
+    assert job.message.startswith("flowborne: character.glb")
+    other = new_job(tmp_path / "other", (sys.executable, "-m", "flowborne_of_another_name"))
+    other.start()
+    assert finish(other) is State.FAILED
+    assert "No module named flowborne_of_another_name" in other.message
+    silent = new_job(tmp_path / "silent", (sys.executable, "-c", "raise SystemExit(7)"))
+    silent.start()
+    assert finish(silent) is State.FAILED
+    assert silent.message == "flowborne ended with code 7"
+    tip = new_job(tmp_path / "tip")
+    tip.reaction = Reaction(("tail_tip",), {}, 1, 36, 24.0)
+    tip.start()
+    assert finish(tip) is State.FAILED
+    assert "bone 'tail_tip' moves nothing of its own" in tip.message
+
+
+def test_engines(tmp_path: Path) -> None:
+    for missing in ("", str(tmp_path), str(tmp_path / "none")):
+        with pytest.raises(JobError, match=r"there is no flowborne in .*python -m venv"):
+            engine_command(missing)
+    python = tmp_path / "bin" / "python"
+    python.parent.mkdir()
+    python.touch()
+    assert engine_command(str(tmp_path)) == (str(python), "-m", "flowborne")
+    assert engine_command(str(python)) == (str(python), "-m", "flowborne")
+    program = tmp_path / "flowborne"
+    program.touch()
+    assert engine_command(str(program)) == (str(program),)
+    job = new_job(tmp_path / "job", (str(program),))
+    with pytest.raises(JobError, match="cannot be started"):
+        job.start()
+    assert job.state is State.FAILED

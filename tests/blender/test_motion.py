@@ -1,0 +1,70 @@
+"""Rotations of bones as Blender keeps them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from blender.motion import MotionError, axes_only, basis, read_motion, same_side, shift, turns
+from numpy.testing import assert_allclose
+from scipy.spatial.transform import Rotation
+
+FRAMES = 30
+
+
+def some(count: int, seed: int) -> np.ndarray:
+    """Rotation matrices."""
+    return Rotation.random(count, random_state=seed).as_matrix()
+
+
+def test_basis_leads_from_the_parent_to_the_bone() -> None:
+    """Blender: world = parent's world, rest of the bone in its parent, basis."""
+    above, turned = some(FRAMES, 1), some(FRAMES, 2)
+    rest, rest_above = some(2, 3)
+    world = above @ rest_above.T @ rest @ turned
+    assert_allclose(basis(world, above, rest, rest_above), turned, atol=1e-12)
+
+
+def test_shift_is_in_the_axes_of_the_bone() -> None:
+    """Blender: head = armature's place, head at rest, rest of the bone times the location."""
+    (rest,), head = some(1, 4), np.array([0.1, 0.2, 0.3])
+    places = np.tile(np.eye(4), (FRAMES, 1, 1))
+    places[:, :3, :3], places[:, :3, 3] = 2.5 * some(FRAMES, 5), np.arange(FRAMES)[:, None]
+    location = np.random.default_rng(6).normal(size=(FRAMES, 3))
+    inner = head + location @ rest.T
+    position = np.einsum("fij,fj->fi", places[:, :3, :3], inner) + places[:, :3, 3]
+    assert_allclose(shift(position, places, rest, head), location, atol=1e-12)
+    assert_allclose(axes_only(places), places[:, :3, :3] / 2.5, atol=1e-12)
+
+
+def test_quaternions_stay_on_one_side() -> None:
+    smooth = Rotation.from_rotvec(np.outer(np.linspace(0, 12, 60), [0.6, 0, 0.8]))
+    found = same_side(smooth.as_quat(canonical=True, scalar_first=True))
+    assert np.abs(np.diff(found, axis=0)).max() < 0.2
+    assert_allclose(Rotation.from_quat(found, scalar_first=True).as_matrix(), smooth.as_matrix())
+
+
+@pytest.mark.parametrize("ends", [(0.0, 12.0), (-2.0, 2.0), (3.0, 3.0)])
+def test_angles_and_axes_do_not_jump(ends: tuple[float, float]) -> None:
+    """Through rest and half turns; a whole turn more is the same rotation."""
+    smooth = Rotation.from_rotvec(np.outer(np.linspace(*ends, 60), [0.6, 0.0, 0.8]))
+    found = turns(smooth.as_quat(canonical=True, scalar_first=True))
+    assert np.abs(np.diff(found[:, 0])).max() < 0.25
+    away = np.linalg.norm(smooth.as_rotvec(), axis=1) > 1e-6
+    assert np.abs(np.diff(found[away, 1:], axis=0)).max() < 1e-6
+    same = Rotation.from_rotvec(found[:, :1] * found[:, 1:])
+    assert_allclose(same.as_matrix(), smooth.as_matrix(), atol=1e-9)
+
+
+def test_a_run_without_frames_is_told(tmp_path: Path) -> None:
+    with pytest.raises(MotionError, match="has no frames to bake"):
+        read_motion(tmp_path)
+    (tmp_path / "model.json").write_text(json.dumps({"bodies": ["world"], "joints": []}))
+    with pytest.raises(MotionError, match="it has no states"):
+        read_motion(tmp_path)
+    (tmp_path / "states").mkdir()
+    (tmp_path / "states" / "000000.npz").write_bytes(b"cut")
+    with pytest.raises(MotionError, match="has no frames to bake"):
+        read_motion(tmp_path)
