@@ -16,10 +16,10 @@ from flowborne.base.arguments import (
     TEXT,
     VECTOR,
     check,
-    having,
     one_of,
     or_none,
     several,
+    such,
     takes,
 )
 from flowborne.base.one_line import one_line
@@ -139,9 +139,9 @@ class Setup:
             self,
             solid=one_of(SolidModel, wanted="a SolidModel"),
             fluid=or_none(one_of(Fluid, wanted="a Fluid")),
-            motions=several(having("position"), "motions"),
-            winds=several(having("wrench"), "winds"),
-            forces=several(having("wrench"), "forces"),
+            motions=several(such(lambda each: hasattr(each, "position")), "motions"),
+            winds=several(such(lambda each: hasattr(each, "wrench")), "winds"),
+            forces=several(such(lambda each: hasattr(each, "wrench")), "forces"),
         )
 
     @property

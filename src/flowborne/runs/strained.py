@@ -56,12 +56,12 @@ def _keep(found: dict[str, tuple[int, Passed]], frame: int, passed: Iterable[Pas
     for each in passed:
         if each.amount > each.allowed:
             _, known = found.get(each.name, (0, None))
-            if known is None or each.amount / each.allowed > known.amount / known.allowed:
+            if known is None or each.ratio > known.ratio:
                 found[each.name] = frame, each
 
 
 def _worst(found: dict[str, tuple[int, Passed]]) -> tuple[int, Passed]:
-    return max(found.values(), key=lambda each: each[1].amount / each[1].allowed)
+    return max(found.values(), key=lambda each: each[1].ratio)
 
 
 def _more(found: dict[str, tuple[int, Passed]]) -> str:

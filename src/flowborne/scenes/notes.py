@@ -66,7 +66,7 @@ def _creeping(scene: Scene) -> Iterator[str]:
     """That viscosity and pressure are solved for several times a step."""
     if scene.fluid is None or scene.domain is None:
         return
-    dt, h = scene.frame_time / scene.time.steps_per_frame, scene.domain.grid().spacing
+    dt, h = scene.step_time, scene.domain.grid().spacing
     number = viscous_number(scene.fluid.viscosity, scene.fluid.density, dt, h)
     if number >= CREEPING:
         yield (
@@ -164,7 +164,7 @@ def _model_file(scene: Scene, model: SolidModel) -> Iterator[str]:
     """Settings of the model file that have no effect, and parts that it switches off."""
     if scene.model_path is None or scene.solids is None:
         return
-    spec, step = spec_of(scene), scene.frame_time / scene.time.steps_per_frame
+    spec, step = spec_of(scene), scene.step_time
     name, on_floors = scene.model_path.name, bool(floors(model.mj))
     options = replaced_options(spec, scene.gravity, step, on_floors)
     unused = [*options, *_elements(scene, spec, model), *_densities(scene, spec)]

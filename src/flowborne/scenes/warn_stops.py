@@ -26,7 +26,7 @@ def soft_stops(scene: Scene, setup: Setup) -> Iterator[str]:
     """Stops that give way for more than SOFT of the period of the fastest prescribed motion."""
     model, mj = setup.solid, setup.solid.mj
     driven = driven_dofs(scene, model, setup.motions)
-    step = scene.frame_time / scene.time.steps_per_frame
+    step = scene.step_time
     times = {
         name: time
         for j, name in enumerate(model.joint_names)
@@ -70,7 +70,7 @@ def past_stops(scene: Scene, setup: Setup) -> Iterator[str]:
                 if moved and passed.amount >= max(passed.allowed, known.amount):
                     found[passed.name] = passed
     if found:
-        worst = max(found.values(), key=lambda passed: passed.amount / passed.allowed)
+        worst = max(found.values(), key=lambda passed: passed.ratio)
         more = f" ({len(found) - 1} more too)" if len(found) > 1 else ""
         yield (
             f"[solids]: {worst.name} moves to {worst.said(worst.place)}, "
