@@ -87,6 +87,7 @@ class Fluid:
             density=POSITIVE,
             viscosity=NOT_NEGATIVE,
             boundaries=one_of(Boundaries, wanted="Boundaries"),
+            sources=several(one_of(Source), "sources"),
             scalars=several(TEXT, "names of dyes"),
             body_force=VECTOR,
             tolerance=PART,
@@ -142,6 +143,8 @@ class Setup:
             motions=several(such(lambda each: hasattr(each, "position")), "motions"),
             winds=several(such(lambda each: hasattr(each, "wrench")), "winds"),
             forces=several(such(lambda each: hasattr(each, "wrench")), "forces"),
+            mouths=several(one_of(Mouth), "mouths"),
+            thrusters=several(one_of(Thruster), "thrusters"),
         )
 
     @property

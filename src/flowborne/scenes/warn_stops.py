@@ -8,7 +8,7 @@ from contextlib import suppress
 
 import numpy as np
 
-from flowborne.base.phrases import listed, rounded_down
+from flowborne.base.phrases import listed, more_too, rounded_down
 from flowborne.coupling.world import Setup
 from flowborne.motion.tracks import SPEED_SAMPLES
 from flowborne.scenes.bodies import driven_dofs, initial_state
@@ -71,11 +71,10 @@ def past_stops(scene: Scene, setup: Setup) -> Iterator[str]:
                     found[passed.name] = passed
     if found:
         worst = max(found.values(), key=lambda passed: passed.ratio)
-        more = f" ({len(found) - 1} more too)" if len(found) > 1 else ""
         yield (
             f"[solids]: {worst.name} moves to {worst.said(worst.place)}, "
-            f"{worst.said(worst.amount)} beyond its range{more}, and its stop pushes against its "
-            "drive; a wider range in the model will do, or a motion within it"
+            f"{worst.said(worst.amount)} beyond its range{more_too(found)}, and its stop "
+            "pushes against its drive; a wider range in the model will do, or a motion within it"
         )
 
 
