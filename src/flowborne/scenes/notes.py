@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-import mujoco
 import numpy as np
 
 from flowborne.base.phrases import listed
@@ -202,7 +201,7 @@ def _elements(scene: Scene, spec: MjSpec, model: SolidModel) -> Iterator[str]:
 def _densities(scene: Scene, spec: MjSpec) -> Iterator[str]:
     """Densities of the scene that an inertia or a mass in the file overrules, and densities of the
     file that the scene's replace."""
-    given, default = given_of(scene), mujoco.MjSpec().default.geom.density
+    given, default = given_of(scene), MjSpec().default.geom.density
     dense = {b.name for b in spec.bodies[1:] if given.density_of(b.name) is not None}
     own = [name for name in bodies_with_own_inertia(spec) if name in dense]
     if own:
