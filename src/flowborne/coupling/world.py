@@ -140,7 +140,7 @@ class Setup:
             self,
             solid=one_of(SolidModel, wanted="a SolidModel"),
             fluid=or_none(one_of(Fluid, wanted="a Fluid")),
-            motions=several(such(lambda each: hasattr(each, "position")), "motions"),
+            motions=several(such(lambda each: hasattr(each, "dofs")), "motions"),
             winds=several(such(lambda each: hasattr(each, "wrench")), "winds"),
             forces=several(such(lambda each: hasattr(each, "wrench")), "forces"),
             mouths=several(one_of(Mouth), "mouths"),
