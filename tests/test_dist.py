@@ -33,8 +33,8 @@ def files(source: Path, *kinds: str) -> set[str]:
     }
 
 
-DATA = files(ROOT, ".toml", ".xml", ".npz")
-"""Scenes, models and meshes."""
+DATA = files(ROOT, ".toml", ".xml", ".npz", ".js")
+"""Scenes, models, meshes and the script of a page."""
 
 FOUND = interpreters()
 PRESENT = f"{sys.version_info.major}.{sys.version_info.minor}"

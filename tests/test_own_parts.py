@@ -186,7 +186,7 @@ def test_a_part_that_fails_stops_the_run_with_its_place(
     path.write_text(text[: text.index("return")] + f"{statement}\n")
     result = fb.run(scene, tmp_path / "run", film=False)
     forget(part)
-    assert result.outcome.name == "BLEW_UP"
+    assert result.outcome.name == "FAILED"
     assert said in result.message
     assert part == "share" or "more steps" not in result.message
 

@@ -1,6 +1,7 @@
 """Kernels and their parallel twins."""
 
 import gc
+import signal
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
 
@@ -8,6 +9,7 @@ import numpy as np
 import pytest
 from numba import prange
 from numba.core import event
+from numba.core.registry import cpu_target
 
 from flowborne.kernels import jit
 from flowborne.kernels.jit import LARGE, allowed_threads, kernel, kernel_threads
@@ -96,6 +98,34 @@ def test_no_garbage_is_collected_while_a_kernel_compiles():
             assert not gc.isenabled()
         assert not gc.isenabled()
     assert gc.isenabled()
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+def test_ctrl_c_while_llvm_calls_python_interrupts_when_the_kernel_is_compiled():
+    """Raised in such a call, an exception is printed and lost."""
+
+    @jit.compiled
+    def add(x):
+        return x + 1.0
+
+    def interrupted(module, buffer):
+        signal.raise_signal(signal.SIGINT)
+        calls.append(module)
+
+    calls = []
+    before = signal.getsignal(signal.SIGINT)
+    codegen = cpu_target.target_context.codegen()
+    library = codegen._library_class
+    codegen._engine.set_object_cache(interrupted, library._object_getbuffer_hook)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            add(1.0)
+    finally:
+        hooks = library._object_compiled_hook, library._object_getbuffer_hook
+        codegen._engine.set_object_cache(*hooks)
+    assert calls
+    assert signal.getsignal(signal.SIGINT) is before
+    assert add(1.0) == 2.0
 
 
 def test_context_is_left_after_an_error():

@@ -78,26 +78,20 @@ def or_none(kind: Kind) -> Kind:
     return Kind(lambda value: None if value is None else kind.read(value), kind.wanted)
 
 
+def such(fits: Callable[[Any], bool], wanted: str = "") -> Kind:
+    """An object that fits, as it is."""
+
+    def same(value: Any) -> Any:
+        if not fits(value):
+            raise ValueError
+        return value
+
+    return Kind(same, wanted)
+
+
 def one_of(*types: type, wanted: str = "") -> Kind:
     """An object of one of some types."""
-
-    def same(value: Any) -> Any:
-        if not isinstance(value, types):
-            raise TypeError
-        return value
-
-    return Kind(same, wanted)
-
-
-def having(attribute: str, wanted: str = "") -> Kind:
-    """An object with an attribute."""
-
-    def same(value: Any) -> Any:
-        if not hasattr(value, attribute):
-            raise TypeError
-        return value
-
-    return Kind(same, wanted)
+    return such(lambda value: isinstance(value, types), wanted)
 
 
 def several(kind: Kind, wanted: str, count: int | None = None) -> Kind:
@@ -142,26 +136,18 @@ def _count(value: Any) -> int:
     return count
 
 
-def _number(value: Any) -> float:
-    if not isinstance(value, Real) or isinstance(value, bool) or not abs(float(value)) <= LARGEST:
-        raise ValueError
-    return float(value)
+def _number(fits: Callable[[float], bool], wanted: str) -> Kind:
+    """A number that fits, of a size that can be squared."""
 
+    def read(value: Any) -> float:
+        if not isinstance(value, Real) or isinstance(value, bool):
+            raise TypeError
+        number = float(value)
+        if not (abs(number) <= LARGEST and fits(number)):
+            raise ValueError
+        return number
 
-def _positive(value: Any) -> float:
-    if not _number(value) > 0.0:
-        raise ValueError
-    return float(value)
-
-
-def _part(value: Any) -> float:
-    if not _positive(value) < 1.0:
-        raise ValueError
-    return float(value)
-
-
-def _not_negative(value: Any) -> float:
-    return abs(_number(value)) if value == 0 else _positive(value)
+    return Kind(read, wanted)
 
 
 def _path(value: Any) -> Any:
@@ -173,22 +159,14 @@ def _path(value: Any) -> Any:
 
 
 def _texts(value: Any) -> dict[str, str]:
-    if not all(isinstance(text, str) for pair in _mapping(value).items() for text in pair):
-        raise TypeError
-    return dict(value)
-
-
-def _mapping(value: Any) -> Mapping[Any, Any]:
-    if not isinstance(value, Mapping):
-        raise TypeError
-    return value
+    return {TEXT.read(key): TEXT.read(text) for key, text in PARAMETERS.read(value).items()}
 
 
 def _values(value: Any) -> dict[str, Any]:
     """Dotted keys and values of a scene; NumPy's arrays and numbers become lists and numbers."""
-    if not (_mapping(value) and all(isinstance(key, str) for key in value)):
-        raise TypeError
-    return {key: _plain(one) for key, one in value.items()}
+    if not value:
+        raise ValueError
+    return {TEXT.read(key): _plain(one) for key, one in PARAMETERS.read(value).items()}
 
 
 def _plain(value: Any) -> Any:
@@ -203,27 +181,18 @@ def _plain(value: Any) -> Any:
     raise TypeError
 
 
-def _function(value: Any) -> Any:
-    if not callable(value):
-        raise TypeError
-    return value
-
-
 AXIS = Kind(lambda value: range(3)[value], "an axis: 0, 1 or 2")
 COUNT = Kind(_count, f"a whole number from 1 to {MOST_COUNT:,}")
 COUNTS = several(COUNT, f"whole numbers from 1 to {MOST_COUNT:,}")
 INDEX = Kind(operator.index, "a whole number")
-NUMBER = Kind(_number, "a finite number")
-POSITIVE = Kind(_positive, "a finite number above 0")
-NOT_NEGATIVE = Kind(_not_negative, "a finite number of 0 or more")
-PART = Kind(_part, "a number above 0 and below 1")
+NUMBER = _number(lambda x: True, "a finite number")
+POSITIVE = _number(lambda x: x > 0.0, "a finite number above 0")
+NOT_NEGATIVE = _number(lambda x: x >= 0.0, "a finite number of 0 or more")
+PART = _number(lambda x: 0.0 < x < 1.0, "a number above 0 and below 1")
 PATH = Kind(_path, "a path")
 TEXT = one_of(str, wanted="a text")
 TEXTS = Kind(_texts, "a dict of dotted keys and texts, as {'time.frames': '9'}")
-PARAMETERS = Kind(_mapping, "a dict")
+PARAMETERS = one_of(Mapping, wanted="a dict")
 VALUES = Kind(_values, "a dict of dotted keys and values, as {'wind.0.velocity': [0.0, 5.0, 0.0]}")
-FUNCTION = Kind(_function, "a function")
-PROGRESS = Kind(
-    lambda value: value if isinstance(value, bool) else _function(value), "a function, or True"
-)
+PROGRESS = such(lambda value: isinstance(value, bool) or callable(value), "a function, or True")
 VECTOR = several(NUMBER, "3 finite numbers", 3)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Sequence, Sized
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context
 from difflib import get_close_matches
 
@@ -28,6 +28,11 @@ def listed(names: Sequence[str]) -> str:
 def and_more(names: Sequence[str]) -> str:
     """The first of some names, and how many more there are."""
     return names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more"
+
+
+def more_too(found: Sized) -> str:
+    """After the first of what was found, that there are more: " (2 more too)", or nothing."""
+    return f" ({len(found) - 1} more too)" if len(found) > 1 else ""
 
 
 def location(point: Iterable[float]) -> str:

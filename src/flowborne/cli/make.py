@@ -96,12 +96,10 @@ def _run_one(
 def _run_clips(
     scene: str, clips: Path, overrides: dict[str, str], out: Path | None, given: dict[str, Any]
 ) -> None:
-    from flowborne.base.progress import ProgressDisplay
     from flowborne.studies.batches import run_clips
 
     _say_if_not_drawn(given["film"])
-    with ProgressDisplay() as progress:
-        batch = run_clips(scene, clips, out, overrides=overrides, progress=progress, **given)
+    batch = run_clips(scene, clips, out, overrides=overrides, progress=True, **given)
     print("\n".join(batch_lines(batch)))
     failed = [done for done in batch.clips if done.failure]
     for done in failed:
@@ -139,18 +137,16 @@ def study(
     ] = None,
 ) -> None:
     """Run a scene many times over its keys, or optimise them; the same command continues."""
-    from flowborne.base.progress import ProgressDisplay
     from flowborne.studies.running import Plan, study
 
     plan = Plan.of(file)
     print(plan, flush=True)
     if check:
         return
-    with ProgressDisplay() as progress:
-        try:
-            result = study(plan, out, workers=workers, dask=dask, retry=retry, progress=progress)
-        except KeyboardInterrupt as stop:
-            raise StoppedError("interrupted; the same command continues the study") from stop
+    try:
+        result = study(plan, out, workers=workers, dask=dask, retry=retry, progress=True)
+    except KeyboardInterrupt as stop:
+        raise StoppedError("interrupted; the same command continues the study") from stop
     for pair in plot or ():
         x, _, y = (part.strip() for part in pair.partition(","))
         with writing(result.folder, ValueError):

@@ -16,10 +16,10 @@ from flowborne.base.arguments import (
     TEXT,
     VECTOR,
     check,
-    having,
     one_of,
     or_none,
     several,
+    such,
     takes,
 )
 from flowborne.base.one_line import one_line
@@ -87,6 +87,7 @@ class Fluid:
             density=POSITIVE,
             viscosity=NOT_NEGATIVE,
             boundaries=one_of(Boundaries, wanted="Boundaries"),
+            sources=several(one_of(Source), "sources"),
             scalars=several(TEXT, "names of dyes"),
             body_force=VECTOR,
             tolerance=PART,
@@ -139,9 +140,11 @@ class Setup:
             self,
             solid=one_of(SolidModel, wanted="a SolidModel"),
             fluid=or_none(one_of(Fluid, wanted="a Fluid")),
-            motions=several(having("position"), "motions"),
-            winds=several(having("wrench"), "winds"),
-            forces=several(having("wrench"), "forces"),
+            motions=several(such(lambda each: hasattr(each, "dofs")), "motions"),
+            winds=several(such(lambda each: hasattr(each, "wrench")), "winds"),
+            forces=several(such(lambda each: hasattr(each, "wrench")), "forces"),
+            mouths=several(one_of(Mouth), "mouths"),
+            thrusters=several(one_of(Thruster), "thrusters"),
         )
 
     @property

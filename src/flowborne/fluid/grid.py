@@ -71,7 +71,7 @@ class Grid:
         return " x ".join(str(self.shape[axis]) for axis in self.axes) + " cells"
 
     @classmethod
-    @takes(origin=several(NUMBER, "2 finite numbers", 2))
+    @takes(spacing=POSITIVE, origin=several(NUMBER, "2 finite numbers", 2))
     def slab(cls, nx: int, ny: int, spacing: float, origin: tuple[float, float]) -> Grid:
         """Two-dimensional grid of nx by ny cells with its lower left corner at `origin`."""
         return cls((nx, ny, 1), spacing, (*origin, -0.5 * spacing))

@@ -19,6 +19,7 @@ from __future__ import annotations
 import ctypes
 import gc
 import os
+import signal
 import sys
 import threading
 from collections.abc import Callable, Iterator
@@ -212,25 +213,43 @@ def inlined(function: Callable[..., Any]) -> Any:
     return Kernel(function, forceinline=True)
 
 
-class Uncollected(event.Listener):
-    """While a kernel compiles, no garbage is collected: looking time and again through what Numba
-    makes and keeps takes an eighth of the time. One thread compiles at a time."""
+class Undisturbed(event.Listener):
+    """While a kernel compiles, no garbage is collected: searching all that Numba makes and keeps
+    takes an eighth of the time. Ctrl-C and SIGTERM wait until it is compiled, because an exception
+    of their handlers is lost where LLVM calls Python. One thread compiles at a time."""
 
     depth, collects = 0, False
+
+    def __init__(self) -> None:
+        self.handlers: dict[signal.Signals, Callable[..., Any]] = {}
+        self.waiting: list[int] = []
 
     def on_start(self, started: object) -> None:
         if self.depth == 0:
             self.collects = gc.isenabled()
             gc.disable()
+            if threading.current_thread() is threading.main_thread():
+                for number in (signal.SIGINT, signal.SIGTERM):
+                    if callable(handler := signal.getsignal(number)):
+                        self.handlers[number] = handler
+                        signal.signal(number, lambda number, frame: self.waiting.append(number))
         self.depth += 1
 
     def on_end(self, ended: object) -> None:
         self.depth -= 1
-        if self.depth == 0 and self.collects:
+        if self.depth:
+            return
+        if self.collects:
             gc.enable()
+        while self.handlers:
+            signal.signal(*self.handlers.popitem())
+        if self.waiting:
+            number = self.waiting[0]
+            self.waiting.clear()
+            signal.raise_signal(number)
 
 
-event.register("numba:compile", Uncollected())
+event.register("numba:compile", Undisturbed())
 
 
 @contextmanager

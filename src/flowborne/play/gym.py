@@ -34,7 +34,7 @@ from flowborne.control.commands import (
 from flowborne.control.measurement import Measurement
 from flowborne.kernels.arrays import Array
 from flowborne.scenes.actuators import joints_of_actuators
-from flowborne.scenes.load import load_scene
+from flowborne.scenes.load import scene_of
 from flowborne.scenes.schema import Scene
 from flowborne.sim.columns import sensor_values
 from flowborne.sim.frame import FrameReport
@@ -114,7 +114,7 @@ class SceneEnv(gymnasium.Env):  # type: ignore[name-defined]
         observe: Callable[[Simulation], Array] | None = None,
         render_mode: str | None = None,
     ) -> None:
-        self.scene = load_scene(scene) if isinstance(scene, str | Path) else scene
+        self.scene = scene_of(scene)
         self.simulation = Simulation(self.scene, workers=1)
         ranged = (t for t in self.simulation.setup.thrusters if np.isfinite(t.limits).all())
         self._thrusters = {thruster.name: thruster.limits for thruster in ranged}

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from flowborne.base.phrases import more_too
 from flowborne.kernels.arrays import Mask
 from flowborne.runs.run_folder import RunFolderError
 from flowborne.runs.states import read_state
@@ -38,16 +39,16 @@ def strained(states: Iterable[Path], model: SolidModel, driven: Mask, dt: float)
         frame, worst = _worst(stops)
         yield (
             f"{worst.name} was at {worst.said(worst.place)} in frame {frame}, "
-            f"{worst.said(worst.amount)} beyond its range{_more(stops)}; "
+            f"{worst.said(worst.amount)} beyond its range{more_too(stops)}; "
             f"{_remedy(model, worst, driven)}"
         )
     if opened:
         frame, worst = _worst(opened)
         remedy = "drive fewer joints of its loop" if frame else "start where it is closed"
         yield (
-            f"{worst.name} was open by {worst.said(worst.amount)} in frame {frame}{_more(opened)}, "
-            f"and its softness explains {worst.said(worst.allowed)}; {remedy}, or give it a "
-            "shorter time constant by solref in the model"
+            f"{worst.name} was open by {worst.said(worst.amount)} in frame {frame}"
+            f"{more_too(opened)}, and its softness explains {worst.said(worst.allowed)}; "
+            f"{remedy}, or give it a shorter time constant by solref in the model"
         )
 
 
@@ -56,16 +57,12 @@ def _keep(found: dict[str, tuple[int, Passed]], frame: int, passed: Iterable[Pas
     for each in passed:
         if each.amount > each.allowed:
             _, known = found.get(each.name, (0, None))
-            if known is None or each.amount / each.allowed > known.amount / known.allowed:
+            if known is None or each.ratio > known.ratio:
                 found[each.name] = frame, each
 
 
 def _worst(found: dict[str, tuple[int, Passed]]) -> tuple[int, Passed]:
-    return max(found.values(), key=lambda each: each[1].amount / each[1].allowed)
-
-
-def _more(found: dict[str, tuple[int, Passed]]) -> str:
-    return f" ({len(found) - 1} more too)" if len(found) > 1 else ""
+    return max(found.values(), key=lambda each: each[1].ratio)
 
 
 def _remedy(model: SolidModel, stop: Passed, driven: Mask) -> str:

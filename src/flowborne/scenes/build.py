@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
+from typing import NamedTuple
 
 from flowborne.control.controller import Controller
 from flowborne.control.executors import Mapper, Serial
@@ -60,24 +61,12 @@ def surroundings_of(
     )
 
 
-@dataclass
-class Built:
-    """World and controller of a scene, ready to be stepped.
+class Built(NamedTuple):
+    """World of a scene in its initial state, and its controller: None when no joint is
+    controlled."""
 
-    scene            the scene
-    world            its initial state
-    controller       None when no joint is controlled
-    frame_time       s between frames
-    steps_per_frame  physics steps in a frame
-    frames           number of frames
-    """
-
-    scene: Scene
     world: World
     controller: Controller | None
-    frame_time: float
-    steps_per_frame: int
-    frames: int
 
 
 def build(scene: Scene, executor: Mapper | None = None) -> Built:
@@ -99,8 +88,7 @@ def build(scene: Scene, executor: Mapper | None = None) -> Built:
     if world.fluid is not None and scene.fluid is not None:
         for values, component in zip(world.fluid.velocity, scene.fluid.velocity, strict=True):
             values.fill(component)
-    time = scene.time
-    return Built(scene, world, controller, scene.frame_time, time.steps_per_frame, time.frames)
+    return Built(world, controller)
 
 
 def changed(scene: Scene, setup: Setup, executor: Mapper) -> tuple[Setup, Controller | None]:

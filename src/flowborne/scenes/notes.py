@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-import mujoco
 import numpy as np
 
 from flowborne.base.phrases import listed
@@ -66,7 +65,7 @@ def _creeping(scene: Scene) -> Iterator[str]:
     """That viscosity and pressure are solved for several times a step."""
     if scene.fluid is None or scene.domain is None:
         return
-    dt, h = scene.frame_time / scene.time.steps_per_frame, scene.domain.grid().spacing
+    dt, h = scene.step_time, scene.domain.grid().spacing
     number = viscous_number(scene.fluid.viscosity, scene.fluid.density, dt, h)
     if number >= CREEPING:
         yield (
@@ -164,7 +163,7 @@ def _model_file(scene: Scene, model: SolidModel) -> Iterator[str]:
     """Settings of the model file that have no effect, and parts that it switches off."""
     if scene.model_path is None or scene.solids is None:
         return
-    spec, step = spec_of(scene), scene.frame_time / scene.time.steps_per_frame
+    spec, step = spec_of(scene), scene.step_time
     name, on_floors = scene.model_path.name, bool(floors(model.mj))
     options = replaced_options(spec, scene.gravity, step, on_floors)
     unused = [*options, *_elements(scene, spec, model), *_densities(scene, spec)]
@@ -202,7 +201,7 @@ def _elements(scene: Scene, spec: MjSpec, model: SolidModel) -> Iterator[str]:
 def _densities(scene: Scene, spec: MjSpec) -> Iterator[str]:
     """Densities of the scene that an inertia or a mass in the file overrules, and densities of the
     file that the scene's replace."""
-    given, default = given_of(scene), mujoco.MjSpec().default.geom.density
+    given, default = given_of(scene), MjSpec().default.geom.density
     dense = {b.name for b in spec.bodies[1:] if given.density_of(b.name) is not None}
     own = [name for name in bodies_with_own_inertia(spec) if name in dense]
     if own:

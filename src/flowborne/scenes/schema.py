@@ -236,6 +236,11 @@ class Scene(Table):
         """s between frames."""
         return 1.0 / self.time.frames_per_second
 
+    @property
+    def step_time(self) -> float:
+        """s between steps."""
+        return self.frame_time / self.time.steps_per_frame
+
     def frame_times(self) -> Array:
         """(frames + 1,) times of all frames and of the start, s."""
         return self.frame_time * np.arange(self.time.frames + 1, dtype=np.float64)

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from flowborne.base.phrases import and_more, listed, rounded_down, rounded_up
+from flowborne.base.phrases import and_more, listed, more_too, rounded_down, rounded_up
 from flowborne.coupling.world import Fluid, Setup
 from flowborne.runs.summary import LEAST_WATER
 from flowborne.scenes.bodies import initial_state
@@ -58,9 +58,9 @@ def _too_thin(scene: Scene, setup: Setup, bodies: list[Seen], harm: str) -> Iter
     if not bodies or setup.fluid is None or scene.domain is None:
         return
     worst = min(bodies, key=lambda body: body.thickness)
-    more = f" ({len(bodies) - 1} more too)" if len(bodies) > 1 else ""
     remedy = _remedy(scene, setup, worst.thickness)
-    yield f"[domain]: {_size(worst, setup.fluid.grid.spacing)}, and {harm}{more}; {remedy}"
+    harm += more_too(bodies)
+    yield f"[domain]: {_size(worst, setup.fluid.grid.spacing)}, and {harm}; {remedy}"
 
 
 def _size(body: Seen, h: float) -> str:

@@ -93,7 +93,7 @@ def _enough(
     many are too few.
     """
     count = scene.time.steps_per_frame
-    found = crossing(scene.frame_time / count)
+    found = crossing(scene.step_time)
     left = found[1]
     if not left > most * (1.0 + 1e-9):
         return count, found

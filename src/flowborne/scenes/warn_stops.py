@@ -8,7 +8,7 @@ from contextlib import suppress
 
 import numpy as np
 
-from flowborne.base.phrases import listed, rounded_down
+from flowborne.base.phrases import listed, more_too, rounded_down
 from flowborne.coupling.world import Setup
 from flowborne.motion.tracks import SPEED_SAMPLES
 from flowborne.scenes.bodies import driven_dofs, initial_state
@@ -26,7 +26,7 @@ def soft_stops(scene: Scene, setup: Setup) -> Iterator[str]:
     """Stops that give way for more than SOFT of the period of the fastest prescribed motion."""
     model, mj = setup.solid, setup.solid.mj
     driven = driven_dofs(scene, model, setup.motions)
-    step = scene.frame_time / scene.time.steps_per_frame
+    step = scene.step_time
     times = {
         name: time
         for j, name in enumerate(model.joint_names)
@@ -70,12 +70,11 @@ def past_stops(scene: Scene, setup: Setup) -> Iterator[str]:
                 if moved and passed.amount >= max(passed.allowed, known.amount):
                     found[passed.name] = passed
     if found:
-        worst = max(found.values(), key=lambda passed: passed.amount / passed.allowed)
-        more = f" ({len(found) - 1} more too)" if len(found) > 1 else ""
+        worst = max(found.values(), key=lambda passed: passed.ratio)
         yield (
             f"[solids]: {worst.name} moves to {worst.said(worst.place)}, "
-            f"{worst.said(worst.amount)} beyond its range{more}, and its stop pushes against its "
-            "drive; a wider range in the model will do, or a motion within it"
+            f"{worst.said(worst.amount)} beyond its range{more_too(found)}, and its stop "
+            "pushes against its drive; a wider range in the model will do, or a motion within it"
         )
 
 

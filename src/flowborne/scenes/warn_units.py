@@ -176,15 +176,15 @@ def slow_steps(scene: Scene, setup: Setup) -> Iterator[str]:
     for motion in setup.motions:
         free[motion.dofs] = False
     rate, dof = _fastest(model, initial_state(scene, model).q, np.flatnonzero(free))
-    steps = scene.time.steps_per_frame
-    dt = scene.frame_time / steps
+    dt = scene.step_time
     if rate * dt <= 1.0 + 1e-9:
         return
     period = 2.0 * math.pi / rate
     enough = math.ceil(ENOUGH_STEPS * scene.frame_time / period)
     key = f"time.steps_per_frame = {enough}"
     if enough > MOST_STEPS:
-        key = f"time.frames_per_second = {ENOUGH_STEPS / period / steps:.3g} or more"
+        rate = ENOUGH_STEPS / period / scene.time.steps_per_frame
+        key = f"time.frames_per_second = {rate:.3g} or more"
     name = model.joint_names[model.mj.dof_jntid[dof]]
     yield (
         f"[time]: {name} swings with a period of {period:.3g} s, and a step is {dt:.3g} s, where "

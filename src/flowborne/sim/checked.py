@@ -12,7 +12,6 @@ import numpy as np
 from flowborne.coupling.world import Setup
 from flowborne.scenes.creature import Creature, creature_extent, creature_of
 from flowborne.scenes.listing import has_gas
-from flowborne.scenes.load import load_scene
 from flowborne.scenes.notes import notes_of
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.seen import Seen, seen_bodies
@@ -77,9 +76,8 @@ def check(scene: Scene | str | Path) -> Checked:
     scene   a Scene, or the name of a built-in one, or the path of a scene file
     raises  SceneError with every problem if the scene is wrong
     """
-    wanted = load_scene(scene) if isinstance(scene, str | Path) else scene
-    with Simulation(wanted, workers=1) as simulation:
-        setup = simulation.setup
+    with Simulation(scene, workers=1) as simulation:
+        wanted, setup = simulation.scene, simulation.setup
         started = setup.fluid is None or prod(setup.fluid.grid.shape) <= MOST_STARTED
         if started:
             simulation.snapshot()

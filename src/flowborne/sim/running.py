@@ -429,7 +429,7 @@ class _Run:
         """Reasons not to trust the frames so far, including those of earlier runs in the folder."""
         simulation = self.simulation
         setup, scene = simulation.setup, simulation.scene
-        model, dt = setup.solid, simulation.frame_time / simulation.steps_per_frame
+        model, dt = setup.solid, simulation.step_time
         bodies = [model.body_names[body] for body in np.flatnonzero(model.met & model.moving)]
         found = doubts_of(self.folder.history, bodies, setup.fluid)
         driven = driven_dofs(scene, model, setup.motions)

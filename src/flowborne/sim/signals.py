@@ -45,8 +45,7 @@ class Signals:
         try:
             yield
         except Exception as error:
-            # an interrupt becomes a SystemError while a kernel returns its result, and a
-            # TypingError while Numba compiles it
+            # an interrupt becomes a SystemError while a kernel returns its result
             if not self.asked:
                 raise
             raise KeyboardInterrupt from error

@@ -28,42 +28,31 @@ from flowborne.base.arguments import (
 from flowborne.base.errors import PartError, SceneError, described
 from flowborne.base.phrases import suggestion
 from flowborne.control.commands import Commands, Drives, drives_of, told_by
-from flowborne.coupling.report import BREAKDOWNS, Outcome, StepReport
+from flowborne.coupling.report import BREAKDOWNS, StepReport
 from flowborne.coupling.stream import FlowState, flow_at
 from flowborne.coupling.world import Setup, World
-from flowborne.fluid.boundary import SIDES
-from flowborne.kernels.arrays import PRESCRIBED, Array, Integers
-from flowborne.kernels.faces import is_finite
+from flowborne.kernels.arrays import Array
 from flowborne.kernels.jit import LARGE, cores, kernel_threads
-from flowborne.runs.summary import BUDGET_OPEN
 from flowborne.scenes.actuators import joints_of_actuators, scene_controls
 from flowborne.scenes.changes import ChangeTable, plain, values_at
 from flowborne.sim.columns import Columns
 from flowborne.sim.frame import PARTS, FrameReport, Snapshot
+from flowborne.sim.trouble import trouble
 from flowborne.sim.turn import Turn
-from flowborne.solids.flesh import inversion
-from flowborne.solids.model import FREE, turning_dofs
+from flowborne.solids.model import FREE
 from flowborne.solids.motors import activations_of, driven_by, outputs_of
 from flowborne.solids.sensed import ActuatorState, BodyState, JointState
 from flowborne.solids.sensors import readings
-from flowborne.solids.surfaces import geom_boxes
 from flowborne.solids.trajectories import NOTHING_TOLD
 
 if TYPE_CHECKING:
-    from flowborne.control.controller import Controller
     from flowborne.scenes.schema import Scene
     from flowborne.solids.trajectories import JointCommand
 
 Step = Callable[[World, float, "JointCommand | None"], StepReport]
 
-MAX_INVERTED = 0.02
-"""Largest share of the elements of flesh that may be inside out for a while."""
-
 FIELDS = 4
 """Elements per cell of a kernel's largest array: all levels of a solve, with their ghosts."""
-
-LISTED = 4
-"""Maximum number of dofs named in a message."""
 
 
 class BlowUpError(Exception):
@@ -95,6 +84,7 @@ class Simulation:
     scene            the Scene
     controller       the Controller, or None
     frame_time       duration of a frame, s
+    step_time        duration of a step, s
     steps_per_frame  physics steps in a frame
     frames           number of frames of the scene; `advance_frame` does not stop there
     columns          of the history
@@ -119,18 +109,16 @@ class Simulation:
         kind = ("serial" if count == 1 else "threads") if executor is None else executor
         with _enough_memory(self.scene):
             self._executor = mapper(kind, count)
-            built = build(self.scene, self._executor)
-        self.controller: Controller | None = built.controller
-        self.frame_time = built.frame_time
-        self.steps_per_frame = built.steps_per_frame
-        self.frames = built.frames
+            world, self.controller = build(self.scene, self._executor)
+        self.frame_time, self.step_time = self.scene.frame_time, self.scene.step_time
+        self.steps_per_frame, self.frames = self.scene.time.steps_per_frame, self.scene.time.frames
         output, stream = self.scene.output, self.scene.stream()
-        model, actuators = built.world.setup.solid, self.scene.told_actuators()
+        model, actuators = world.setup.solid, self.scene.told_actuators()
         policy = self.scene.policy
         told, pushed = ((), ()) if policy is None else (policy.joints, policy.bodies)
         told += joints_of_actuators(model, actuators)
         self.columns = Columns(
-            built.world.setup,
+            world.setup,
             self.controller,
             stream,
             output.bodies,
@@ -143,7 +131,7 @@ class Simulation:
         self._changes: tuple[ChangeTable, ...] = self.scene.changes
         self._values: dict[str, Any] = {}
         self._policy = None if policy is None else policy.build()
-        self._moment = Snapshot(built.world, 0, None)
+        self._moment = Snapshot(world, 0, None)
         self._started = False
         self._turn = Turn()
         self._step: Step = step
@@ -337,7 +325,7 @@ class Simulation:
         try:
             if policy is not None and self._policy is not None:
                 commands = self._policy(self)
-            if not (commands := self._with_controls(commands or {})):
+            if not (commands := self._with_controls({} if commands is None else commands)):
                 return ()
             world.told, beyond = told_by(commands, world, self.frame_time, self._drives())
             return beyond
@@ -407,7 +395,7 @@ class Simulation:
             world.told = replace(NOTHING_TOLD, controls=told.controls)
         try:
             with _one_blas_thread(), kernel_threads(), _enough_memory(scene):
-                start(world, self.frame_time / self.steps_per_frame, given, held)
+                start(world, self.step_time, given, held)
         except PartError as error:
             raise SceneError(f"scene {scene.name}: {error}") from error
         except BREAKDOWNS as error:
@@ -421,7 +409,7 @@ class Simulation:
     def _advance(self, world: World, frame: int, beyond: tuple[str, ...]) -> FrameReport:
         """Advance `world` by a frame, in place; `beyond` as in its report."""
         started = perf_counter()
-        controller, dt = self.controller, self.frame_time / self.steps_per_frame
+        controller, dt = self.controller, self.step_time
         end = world.time + self.frame_time
         seconds = dict.fromkeys(PARTS, 0.0)
         nothing = np.zeros(0)
@@ -483,81 +471,6 @@ def _enough_memory(scene: Scene) -> Iterator[None]:
             f"scene {scene.name} does not fit into the memory of this machine ({error}). "
             "Make its grid coarser: lower [domain] resolution or cells."
         ) from error
-
-
-def trouble(world: World, report: StepReport) -> str | None:
-    """Why the world cannot be advanced after the step of `report`, or None."""
-    if report.outcome is Outcome.PRESSURE_NOT_CONVERGED:
-        detail = (
-            f"relative residual {report.residual:.2g} after {report.solver_iterations} iterations"
-        )
-        return f"{report.outcome.value} ({detail})"
-    if report.outcome is Outcome.NOT_SETTLED and report.unsettled.size:
-        return f"{report.outcome.value} (at {_listed(world, report.unsettled)})"
-    if report.outcome is not Outcome.DONE:
-        return report.outcome.value
-    solid, fluid, properties = world.solid, world.fluid, world.setup.fluid
-    if not (np.isfinite(solid.q).all() and np.isfinite(solid.v).all()):
-        return "a joint's position or velocity is not a finite number"
-    turn = np.abs(solid.v * report.dt) * turning_dofs(world.setup.solid)
-    if turn.size and turn.max() > np.pi:
-        name = world.setup.solid.dof_names[int(turn.argmax())]
-        return f"{name} turns by {turn.max():.3g} rad in one step, more than half a turn"
-    flesh = world.setup.solid.flesh
-    torn = None if flesh is None else inversion(flesh, solid.q)
-    if torn is not None and len(torn.elements) > MAX_INVERTED * torn.of:
-        return torn.sentence()
-    if fluid is None or properties is None:
-        return None
-    left = departed(world, report)
-    if left:
-        return left
-    grid = properties.grid
-    if not all(map(is_finite, (*fluid.velocity, fluid.pressure))):
-        return Outcome.NOT_FINITE.value
-    longest, moved = max(grid.shape) * grid.spacing, report.fastest * report.dt
-    if moved > longest:
-        return (
-            f"the fluid moves {moved:.3g} m in one step, farther than the domain is long "
-            f"({longest:.3g} m)"
-        )
-    return None
-
-
-def departed(world: World, report: StepReport) -> str | None:
-    """Which body is where there is no fluid, beyond a side that lets nothing through, or None.
-
-    Its centre of mass is there, or it reaches there by more than a cell and momentum is lost.
-    """
-    model, fluid = world.setup.solid, world.setup.fluid
-    if fluid is None or fluid.one_way:
-        return None
-    grid, h = fluid.grid, fluid.grid.spacing
-    body, low = np.arange(model.nbody), report.centre
-    high = low
-    if report.momentum_budget_error > BUDGET_OPEN:
-        first, last = geom_boxes(model, world.solid.q)
-        body = np.append(body, model.geom_body)
-        low, high = np.concatenate([low, first + h]), np.concatenate([high, last - h])
-    met = (model.moving & (model.volume > 0.0))[body]
-    for axis in grid.axes:
-        gone = low[:, axis] < grid.origin[axis], high[:, axis] > grid.upper[axis]
-        for end, side in enumerate(fluid.boundaries.pair(axis)):
-            found = np.flatnonzero(met & gone[end])
-            if found.size and side.normal == PRESCRIBED:
-                return (
-                    f"body '{model.body_names[body[found[0]]]}' has left the domain through its "
-                    f"{side.kind} side {SIDES[2 * axis + end]}; enlarge [domain], or put a plane "
-                    "with contact into the model where the side is"
-                )
-    return None
-
-
-def _listed(world: World, dofs: Integers) -> str:
-    """Names of the first few of some dofs."""
-    names = [world.setup.solid.dof_names[dof] for dof in dofs[:LISTED]]
-    more = len(dofs) - len(names)
-    return ", ".join(names) + (f" and {more} more" if more else "")
 
 
 def default_workers(joints: int, fluid: bool) -> int:

@@ -42,6 +42,11 @@ class Passed:
     place: float = np.nan
     joint: int = -1
 
+    @property
+    def ratio(self) -> float:
+        """Amount in parts of what is allowed."""
+        return self.amount / self.allowed if self.allowed > 0.0 else np.inf
+
     def said(self, value: float) -> str:
         """An amount in the unit of a scene."""
         return f"{np.degrees(value):.3g} degrees" if self.turns else f"{value:.3g} m"

@@ -6,6 +6,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from flowborne.base.arguments import PATH, TEXT, or_none, several, takes
 from flowborne.base.extras import check_drawing, optional
 from flowborne.runs.open_run import StoredRun
 from flowborne.runs.run_folder import RunFolder, reading
@@ -66,6 +67,7 @@ class OpenRun(StoredRun):
         table: pandas.DataFrame = library.DataFrame(self.history)
         return table.astype({"frame": int}).set_index("frame")
 
+    @takes(columns=several(TEXT, "names of columns"))
     def plot(self, *columns: str) -> Plot:
         """Plot columns of the history over time, a strip for each.
 
@@ -81,6 +83,7 @@ class OpenRun(StoredRun):
         curves = {column: self.history[column] for column in columns}
         return plot_columns(self.history["time_s"], curves)
 
+    @takes(out=or_none(PATH))
     def film(self, out: str | Path | None = None) -> Film:
         """Draw the run, or give the film that it has.
 
@@ -90,17 +93,15 @@ class OpenRun(StoredRun):
         raises   SceneError when a library for it is not installed; ValueError for another ending,
                  or a run of one frame; OSError if the file cannot be written
         """
-        files = RunFolder(self.folder)
-        if out is None and files.film.exists():
-            return Film(files.film)
-        check_drawing()
-        from flowborne.view.film import make_preview, write_shot
+        path = RunFolder(self.folder).film if out is None else Path(out)
+        if out is not None or not path.exists():
+            check_drawing()
+            from flowborne.view.film import make_preview, write_shot
 
-        if out is None:
-            make_preview(self.folder)
-            return Film(files.film)
-        path = Path(out)
-        write_shot(self.folder, path)
+            if out is None:
+                make_preview(self.folder)
+            else:
+                write_shot(self.folder, path)
         return Film(path)
 
 

@@ -168,7 +168,7 @@ def test_walls_of_a_slab_are_thicker_than_sides_that_fluid_passes(viewer: Viewer
     """The block's stream enters at x_min and leaves at x_max, between walls."""
     run, scene = viewer.run, viewer.server.scene
     assert run.grid is not None
-    run.scene["boundaries"] = {"x_min": {"kind": "inflow"}, "x_max": "open", "y_max": "closed"}
+    run.tables["boundaries"] = {"x_min": {"kind": "inflow"}, "x_max": "open", "y_max": "closed"}
     Surroundings(scene, run, viewer._view)
     walls = scene._handle_from_node_name["/run/domain/walls"]
     others = scene._handle_from_node_name["/run/domain/open"]

@@ -8,11 +8,14 @@ from pathlib import Path
 from threading import Event, Thread
 from typing import TYPE_CHECKING, Any
 
+from flowborne.base.arguments import PATH, TEXT, read, such, takes
 from flowborne.base.extras import optional
 from flowborne.runs.open_run import StoredRun
 
 if TYPE_CHECKING:
     from flowborne.view.open_run import OpenRun
+
+PORT = such(range(1, 65536).__contains__, "a whole number from 1 to 65535")
 
 
 class Page:
@@ -64,6 +67,7 @@ class _ClosedError(Exception):
     """The page has been closed."""
 
 
+@takes(port=PORT, host=TEXT)
 def view(run: OpenRun | str | Path, port: int = 8080, host: str = "127.0.0.1") -> Page:
     """View a run in a browser, also while it goes on. The page is served until it is closed or the
     program ends; a notebook shows it.
@@ -78,5 +82,5 @@ def view(run: OpenRun | str | Path, port: int = 8080, host: str = "127.0.0.1") -
     optional("pyvista", "PyVista", "view", "views in a browser")
     from flowborne.view.browser.viewer import open_viewer
 
-    folder = run.folder if isinstance(run, StoredRun) else Path(run)
+    folder = run.folder if isinstance(run, StoredRun) else Path(read(PATH, run, "run"))
     return Page(folder, f"http://{host}:{port}", open_viewer(folder, host, port))
