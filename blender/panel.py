@@ -108,8 +108,9 @@ class FlowbornePreferences(bpy.types.AddonPreferences):
         self.layout.prop(self, "engine")
 
 
-def start_job(context: Any, engine: str) -> Job:
-    """Export the active character, and start its run in a new folder next to the .blend.
+def start_job(context: Any, engine: str, only_check: bool = False) -> Job:
+    """Export the active character, and start its run, or only a check of its scene, in a new folder
+    next to the .blend.
 
     raises  one of ERRORS
     """
@@ -123,7 +124,7 @@ def start_job(context: Any, engine: str) -> Job:
     job = Job(command, _folder(armature, max(numbers, default=0) + 1), reaction)
     earlier = 0 if reaction.loop else reaction.lead
     export_character(context, armature, job.folder / CHARACTER, earlier)
-    job.start()
+    job.start(only_check)
     settings.folder = _relative(job.folder)
     JOBS[str(job.folder)] = job
     return job
@@ -183,6 +184,7 @@ class FlowborneRun(bpy.types.Operator):
     bl_label = "Run"
 
     resume: BoolProperty(options={"SKIP_SAVE"})
+    only_check: BoolProperty(options={"SKIP_SAVE"})
 
     def execute(self, context: Any) -> set[str]:
         with _reported(self):
@@ -191,7 +193,7 @@ class FlowborneRun(bpy.types.Operator):
                 self._job.engine = engine_command(engine_of(context))
                 self._job.start()
             else:
-                self._job = start_job(context, engine_of(context))
+                self._job = start_job(context, engine_of(context), self.only_check)
             manager = context.window_manager
             self._timer = manager.event_timer_add(PERIOD, window=context.window)
             manager.modal_handler_add(self)
@@ -347,8 +349,12 @@ def line_of(job: Job) -> str:
     """The state of a job in one line, or its message."""
     if job.message:
         return job.message
-    left, frames = job.seconds_left, f"frame {job.frames_done}/{job.reaction.frames}"
-    return f"{job.state.value}, {frames}" + ("" if left is None else f", {left:.0f} s left")
+    left, said = job.seconds_left, job.state.value
+    if job.state is not State.CHECKED:
+        said += f", frame {job.frames_done}/{job.reaction.frames}"
+    if left is not None:
+        return f"{said}, {left:.0f} s left"
+    return f"{said}: {job.cost}" if job.cost and job.state is not State.DONE else said
 
 
 class FlowbornePanel(bpy.types.Panel):
@@ -392,6 +398,7 @@ class FlowbornePanel(bpy.types.Panel):
             job = None
         if job is None or job.state not in ACTIVE:
             layout.operator(FlowborneRun.bl_idname)
+            layout.operator(FlowborneRun.bl_idname, text="Check").only_check = True
         if job is None:
             return
         for line in line_of(job).split("\n"):
