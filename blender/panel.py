@@ -421,6 +421,7 @@ class FlowborneRunsPanel(bpy.types.Panel):
     bl_label = "Runs"
     bl_idname = "FLOWBORNE_PT_runs"
     bl_parent_id = FlowbornePanel.bl_idname
+    bl_category = FlowbornePanel.bl_category
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
     bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012 - Blender's way
