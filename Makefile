@@ -10,7 +10,7 @@ BPY_VENV := build/bpy-$(BPY)
 # Every process would compile the package anew, a fifth of what it takes to start.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: baselines chapters closeness demo lint test browser dist docs gltf-validator imports failing films same-figures gallery paper exporters fuzz messages size speed strangers validation-page clean blender
+.PHONY: baselines chapters closeness demo lint test browser dist docs gltf-validator imports failing films same-figures gallery paper exporters fuzz messages size speed strangers validation-page clean blender blender-sample
 
 demo: $(VENV)/installed
 	$(BIN)/flowborne run ns-block-drag-max --out runs/ns-block-drag-max --replace
@@ -32,6 +32,11 @@ blender: $(VENV)/installed-test
 	test -x $(BPY_VENV)/bin/python || $(BLENDER_PYTHON) -m venv $(BPY_VENV)
 	$(BPY_VENV)/bin/python -m pip install --quiet bpy==$(BPY)
 	FLOWBORNE_BPY=$(BPY_VENV)/bin/python $(BIN)/pytest -m blender --numprocesses 0 tests/blender
+
+blender-sample: $(VENV)/installed
+	test -x $(BPY_VENV)/bin/python || $(BLENDER_PYTHON) -m venv $(BPY_VENV)
+	$(BPY_VENV)/bin/python -m pip install --quiet bpy==$(BPY)
+	$(BPY_VENV)/bin/python tools/blender_sample.py --engine $(VENV) --out build/blender-sample
 
 dist: $(VENV)/installed-test
 	$(BIN)/python tools/dist.py

@@ -3,12 +3,13 @@
 
 job        a run of flowborne as a child process; files are exchanged, nothing else
 reaction   the settings of a run, and the scene file made of them
+presets    bones by their names
 motion     what a run gives, and the rotation of bones in it
 character  armature, meshes and settings from a Blender scene
 bake       a run as an action on the NLA
 panel      properties, operators and the panel
 
-`job`, `reaction` and `motion` do not import Blender.
+`job`, `reaction`, `presets` and `motion` do not import Blender.
 """
 
 

@@ -4,18 +4,35 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import bpy
 import numpy as np
-from mathutils import Matrix
+from mathutils import Euler, Matrix
 
 from .character import TRACK, check_armature
-from .motion import Array, Motion, MotionError, axes_only, basis, same_side, shift, turns
+from .motion import (
+    Array,
+    Motion,
+    MotionError,
+    axes_only,
+    basis,
+    keys_within,
+    same_side,
+    shift,
+    turns,
+)
 
 
 def bake(
-    context: Any, armature: Any, motion: Motion, first: int, unit: float, bones: Sequence[str]
+    context: Any,
+    armature: Any,
+    motion: Motion,
+    first: int,
+    unit: float,
+    bones: Sequence[str],
+    tolerance: float = 0.0,
 ) -> Any:
     """Put the motion of bones on the NLA of an armature, and return the strip.
 
@@ -23,9 +40,10 @@ def bake(
     its axes in the world are those of the run in every frame. The active action is moved to a strip
     below, where it plays as before; its keys do not change.
 
-    first   frame of Blender at which the run starts
-    unit    m per unit of Blender
-    raises  MotionError or ReactionError when these bones cannot be baked on this armature
+    first      frame of Blender at which the motion starts
+    unit       m per unit of Blender
+    tolerance  degrees by which a bone's rotation may differ where keys are left out; 0 keeps all
+    raises     MotionError or ReactionError when these bones cannot be baked on this armature
     """
     check_armature(armature)
     motion.check(bones)
@@ -52,7 +70,10 @@ def bake(
         position, rotation = motion.of(name)
         turned = basis(rotation, above, axes_only(rest), rest_above)
         path, values = _rotations(bone.rotation_mode, turned, before.started[name])
-        _add_curves(bag, bone, path, frames, values)
+        kept = [*range(len(frames))]
+        if tolerance > 0.0:
+            kept = keys_within(values, partial(_quaternions, bone.rotation_mode), tolerance)
+        _add_curves(bag, bone, path, frames[kept], values[kept])
         if bone.parent is None:
             location = shift(position / unit, before.places, axes_only(rest), rest[:3, 3])
             _add_curves(bag, bone, "location", frames, location)
@@ -126,6 +147,19 @@ def _rotations(mode: str, turned: Array, start: Any) -> tuple[str, Array]:
         start = matrix.to_euler(mode, start)
         eulers.append(np.array(start))
     return "rotation_euler", np.array(eulers)
+
+
+def _quaternions(mode: str, values: Array) -> Array:
+    """Unit quaternions (n, 4) of values (n, 3 or 4) of a rotation mode."""
+    if mode == "QUATERNION":
+        found = values
+    elif mode == "AXIS_ANGLE":
+        half, axes = 0.5 * values[:, :1], values[:, 1:]
+        axes = axes / np.linalg.norm(axes, axis=1, keepdims=True)
+        found = np.hstack([np.cos(half), np.sin(half) * axes])
+    else:
+        found = np.array([Euler(each, mode).to_quaternion() for each in values.tolist()])
+    return np.asarray(found / np.linalg.norm(found, axis=1, keepdims=True))
 
 
 def _add_curves(bag: Any, bone: Any, path: str, frames: Array, values: Array) -> None:

@@ -75,11 +75,16 @@ def meshes_of(context: Any, armature: Any) -> list[Any]:
 def cone_of(bone: Any) -> float | None:
     """Angle in degrees that a pose bone may turn from rest in any direction; None without a limit.
 
-    It is the smallest limit of the bone's Limit Rotation constraints, so that every pose of the
-    run is within all of them.
-    raises  ReactionError for a constraint in another space, or that leaves no cone
+    It is the smallest limit of the bone's Limit Rotation constraints and IK limits, so that every
+    pose of the run is within all of them.
+    raises  ReactionError for a constraint in another space, or limits that leave no cone
     """
     found = []
+    for axis in "xyz":
+        if getattr(bone, f"lock_ik_{axis}"):
+            found.append(0.0)
+        elif getattr(bone, f"use_ik_limit_{axis}"):
+            found += [-getattr(bone, f"ik_min_{axis}"), getattr(bone, f"ik_max_{axis}")]
     for limit in bone.constraints:
         if limit.type != "LIMIT_ROTATION" or limit.mute or limit.influence == 0.0:
             continue
@@ -94,18 +99,27 @@ def cone_of(bone: Any) -> float | None:
         return None
     if min(found) <= 0.0:
         raise ReactionError(
-            f"bone '{bone.name}': its Limit Rotation locks an axis, or excludes the rest pose, "
-            "but a free bone turns about all axes. Widen the limits, or mute the constraint"
+            f"bone '{bone.name}': its Limit Rotation or IK limit locks an axis, or excludes "
+            "the rest pose, but a free bone turns about all axes. Widen the limits, or clear them"
         )
     return math.degrees(min(found))
 
 
 def flow_of(settings: Any) -> Vector:
-    """Velocity of the medium, m/s: along z of the Wind empty, or the vector of the settings."""
+    """Velocity of the medium, m/s: along z of the Wind empty, or the vector of the settings.
+
+    raises  ReactionError for a force field that is no uniform wind
+    """
     source = settings.wind
     if source is None:
         x, y, z = settings.flow
         return x, y, z
+    if source.field is None or source.field.type != "WIND":
+        kind = "none" if source.field is None else source.field.type.replace("_", " ").capitalize()
+        raise ReactionError(
+            f"the force field of '{source.name}' is {kind}, but the flow of a run is uniform far "
+            "from the character: choose an object with a Wind field, or none, and set the vector"
+        )
     x, y, z = source.matrix_world.to_3x3().col[2].normalized() * source.field.strength
     return x, y, z
 
@@ -119,12 +133,16 @@ def reaction_of(context: Any, armature: Any, settings: Any) -> Reaction:
     scene, unit = context.scene, context.scene.unit_settings.scale_length
     free = [bone for bone in armature.pose.bones if bone.select]
     cones = {bone.name: cone for bone in free if (cone := cone_of(bone)) is not None}
+    length = scene.frame_end - scene.frame_start
+    rounds = settings.rounds
     gravity = [unit * g for g in scene.gravity] if scene.use_gravity else (0.0, 0.0, 0.0)
     return Reaction(
         bones=tuple(bone.name for bone in free),
         cones=cones,
         first=scene.frame_start,
-        frames=scene.frame_end - scene.frame_start,
+        frames=rounds * length if rounds > 1 else settings.preroll + length,
+        lead=(rounds - 1) * length if rounds > 1 else settings.preroll,
+        loop=rounds > 1,
         rate=scene.render.fps / scene.render.fps_base,
         unit=unit,
         density=settings.density,
@@ -140,8 +158,10 @@ def reaction_of(context: Any, armature: Any, settings: Any) -> Reaction:
     )
 
 
-def export_character(context: Any, armature: Any, path: Path) -> None:
+def export_character(context: Any, armature: Any, path: Path, earlier: int = 0) -> None:
     """Write armature, meshes and animation of the scene's frame range as a .glb file.
+
+    The animation starts `earlier` frames before the range.
 
     Modifiers other than the armature's are applied. Selection, mode and frame stay as they are.
     raises  ReactionError when the armature is hidden, or no mesh is visible
@@ -150,7 +170,7 @@ def export_character(context: Any, armature: Any, path: Path) -> None:
         raise ReactionError(f"armature '{armature.name}' is hidden: show it for the export")
     meshes = meshes_of(context, armature)
     path.parent.mkdir(parents=True, exist_ok=True)
-    with _ready(context, armature, meshes):
+    with _ready(context, armature, meshes, earlier):
         bpy.ops.export_scene.gltf(
             filepath=str(path),
             export_format="GLB",
@@ -173,8 +193,9 @@ def export_character(context: Any, armature: Any, path: Path) -> None:
 
 
 @contextmanager
-def _ready(context: Any, armature: Any, meshes: list[Any]) -> Iterator[None]:
-    """Context in which the character alone is selected, and its earlier bakes are muted.
+def _ready(context: Any, armature: Any, meshes: list[Any], earlier: int) -> Iterator[None]:
+    """Context in which the character alone is selected, its earlier bakes are muted, and the frame
+    range starts earlier.
 
     Times of a glTF file are in seconds. Blender's exporter multiplies the rate by `fps_base`, by
     which it has to be divided, so that the context holds its inverse.
@@ -192,9 +213,11 @@ def _ready(context: Any, armature: Any, meshes: list[Any]) -> Iterator[None]:
         for track in bakes:
             track.mute = True
         scene.render.fps_base = 1.0 / base
+        scene.frame_start -= earlier
         yield
     finally:
         scene.render.fps_base = base
+        scene.frame_start += earlier
         for track in bakes:
             track.mute = False
         for thing in objects:

@@ -11,7 +11,7 @@ from enum import Enum
 from pathlib import Path
 from time import monotonic
 
-from .reaction import Reaction, ReactionError, write_scene
+from .reaction import Reaction, ReactionError, cost_of, write_scene
 
 CHARACTER = "character.glb"
 """The exported character in the folder of a job."""
@@ -25,6 +25,9 @@ DOUBTFUL = 3
 MESSAGE_LINES = 4
 """Last lines of the log that are shown when a child fails."""
 
+WARNING = "  warning: "
+"""Start of the lines with which `flowborne check` warns."""
+
 
 class JobError(Exception):
     """A job cannot start; the text says why and what to do."""
@@ -35,6 +38,8 @@ class State(Enum):
 
     NEW = "not started"
     IMPORTING = "dividing the character into bodies"
+    CHECKING = "checking the scene"
+    CHECKED = "checked"
     RUNNING = "running"
     STOPPING = "stopping"
     CANCELLED = "cancelled"
@@ -42,7 +47,7 @@ class State(Enum):
     DONE = "done"
 
 
-ACTIVE = (State.IMPORTING, State.RUNNING, State.STOPPING)
+ACTIVE = (State.IMPORTING, State.CHECKING, State.RUNNING, State.STOPPING)
 """States in which a child runs."""
 
 
@@ -65,7 +70,9 @@ def engine_command(place: str) -> tuple[str, ...]:
 
 
 class Job:
-    """A run in a folder: import of `character.glb`, then the run. Both are child processes.
+    """A run in a folder: import of `character.glb`, then the run, or a check of its scene.
+
+    Each is a child process.
 
     engine    command of flowborne
     folder    of the job, with CHARACTER
@@ -83,6 +90,7 @@ class Job:
         self._child: subprocess.Popen[bytes] | None = None
         self._log_start = 0
         self._deadline = 0.0
+        self._only_check = False
         self._pace: tuple[float, int] | None = None
 
     @classmethod
@@ -94,13 +102,16 @@ class Job:
             job.state = State.DONE if complete else State.CANCELLED
         return job
 
-    def start(self) -> None:
-        """Start or resume the job. Raises JobError when it is running, or cannot be started."""
+    def start(self, only_check: bool = False) -> None:
+        """Start or resume the job, or only import the character and check the scene.
+
+        raises  JobError when it is running, or cannot be started
+        """
         if self.state in ACTIVE:
             raise JobError("the run is in progress: wait for its end, or cancel it")
-        self.message, self._pace = "", None
+        self.message, self._pace, self._only_check = "", None, only_check
         if self._scene.exists():
-            self._start_run()
+            self._go_on()
             return
         scene = self.folder / "scene"
         (scene / "character.toml").unlink(missing_ok=True)  # of an import that was killed
@@ -123,7 +134,9 @@ class Job:
         self._child = None
         if code == 0 and self.state is State.IMPORTING:
             self._prepare()
-        elif code in (0, DOUBTFUL):
+        elif code == 0 and self.state is State.CHECKING:
+            self.state = State.CHECKED
+        elif code in (0, DOUBTFUL) and self.state is not State.CHECKING:
             self.state, self.message = State.DONE, self._said() if code else ""
         elif self.state is State.STOPPING:
             self.state = State.CANCELLED
@@ -163,21 +176,37 @@ class Job:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Warnings about the scene of the run, such as bodies that are thinner than two cells."""
+        """Warnings about the scene, such as bodies that are thinner than two cells.
+
+        They are those of the run's summary, or of the last check.
+        """
         try:
             summary = json.loads((self.run / "summary.json").read_text(encoding="utf-8"))
             return tuple(map(str, summary.get("warnings", ())))
         except (OSError, ValueError):
-            return ()
+            lines = self._lines(0) if self._log.exists() else []
+            found = [line.removeprefix(WARNING) for line in lines if line.startswith(WARNING)]
+            return tuple(dict.fromkeys(found))
+
+    @property
+    def cost(self) -> str:
+        """Cells, memory and time of a run in a simulated flow; empty in simple wind or before the
+        scene is written."""
+        simulated = self.reaction.simulated and self._scene.exists()
+        return cost_of(self._scene, self.reaction) if simulated else ""
 
     def _prepare(self) -> None:
         try:
             write_scene(self.folder / "scene" / "character.toml", self.reaction)
-            self._start_run()
+            self._go_on()
         except (ReactionError, JobError) as error:
             self.state, self.message = State.FAILED, str(error)
 
-    def _start_run(self) -> None:
+    def _go_on(self) -> None:
+        """Start the child that comes after the import."""
+        if self._only_check:
+            self._spawn(State.CHECKING, ["check", str(self._scene)])
+            return
         goes_on = "--resume" if (self.run / "checkpoint.npz").exists() else "--replace"
         command = ["run", str(self._scene), "--out", str(self.run), "--no-film", goes_on]
         self._spawn(State.RUNNING, command)
@@ -202,7 +231,11 @@ class Job:
 
     def _said(self) -> str:
         """The last lines that the last child has printed."""
+        lines = [line.strip() for line in self._lines(self._log_start) if line.strip()]
+        return "\n".join(lines[-MESSAGE_LINES:])
+
+    def _lines(self, start: int) -> list[str]:
+        """Lines of the log from a byte on."""
         with self._log.open("rb") as log:
-            log.seek(self._log_start)
-            lines = log.read().decode("utf-8", "replace").split("\n")
-        return "\n".join([line.strip() for line in lines if line.strip()][-MESSAGE_LINES:])
+            log.seek(start)
+            return log.read().decode("utf-8", "replace").splitlines()

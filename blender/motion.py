@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import json
 import zipfile
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -50,6 +50,34 @@ class Motion:
                 raise MotionError(
                     f"the run does not move bone '{bone}'. Select some of: {', '.join(self.moving)}"
                 )
+
+    def after(self, lead: int, loop: bool) -> Motion:
+        """The motion from a frame on; in a loop it is moved to where the first round starts.
+
+        raises  MotionError when the run has not come that far
+        """
+        if len(self.position) <= lead:
+            raise MotionError(
+                f"the run has {len(self.position) - 1} frames, and the bake starts after {lead}: "
+                "resume the run"
+            )
+        position, rotation = self.position[lead:], self.rotation[lead:]
+        if loop:
+            start, turned = self.of(self.moving[0])
+            back = turned[0] @ turned[lead].T
+            position = (position - start[lead]) @ back.T + start[0]
+            rotation = back @ rotation
+        return replace(self, position=position, rotation=rotation)
+
+    def ends_apart(self, bones: Iterable[str]) -> float:
+        """Largest rotation of bones, relative to the root, from first to last frame, degrees."""
+        root = np.swapaxes(self.of(self.moving[0])[1], 1, 2)
+        found = [0.0]
+        for bone in bones:
+            first, *_, last = root @ self.of(bone)[1]
+            cosine = (np.trace(first.T @ last) - 1.0) / 2.0
+            found.append(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
+        return float(max(found))
 
 
 def read_motion(run: Path) -> Motion:
@@ -126,3 +154,29 @@ def turns(quaternions: Array) -> Array:
         found[k] = 2.0 * np.arctan2(quaternion[1:] @ axis, quaternion[0]), *axis
     found[:, 0] = np.unwrap(found[:, 0])
     return found
+
+
+def keys_within(
+    values: Array, quaternions: Callable[[Array], Array], tolerance: float
+) -> list[int]:
+    """Indices of keys between which linear values give the rotations within a tolerance.
+
+    values       (frames, k) of a rotation mode
+    quaternions  (n, k) values to unit quaternions (n, 4)
+    tolerance    largest rotation from the exact one in any frame, degrees
+    source       Douglas and Peucker 1973, with the angle between rotations as distance
+    """
+    exact, last = quaternions(values), len(values) - 1
+    kept, spans = {0, last}, [(0, last)]
+    while spans:
+        low, high = spans.pop()
+        if high - low < 2:
+            continue
+        share = np.linspace(0.0, 1.0, high - low + 1)[1:-1, None]
+        between = quaternions(values[low] + share * (values[high] - values[low]))
+        cosines = np.abs(np.sum(between * exact[low + 1 : high], axis=1))
+        if 2.0 * np.degrees(np.arccos(min(cosines.min(), 1.0))) > tolerance:
+            middle = low + 1 + int(cosines.argmin())
+            kept.add(middle)
+            spans += [(low, middle), (middle, high)]
+    return sorted(kept)

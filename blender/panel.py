@@ -25,6 +25,7 @@ from .bake import bake
 from .character import armature_of, export_character, reaction_of
 from .job import ACTIVE, CHARACTER, Job, JobError, State, engine_command
 from .motion import MotionError, read_motion
+from .presets import PRESETS, named_in, preset
 from .reaction import OBJECTIVES, ReactionError
 
 ERRORS = (JobError, MotionError, ReactionError)
@@ -49,7 +50,7 @@ class FlowborneSettings(bpy.types.PropertyGroup):
         name="Wind",
         description="Wind force field: the flow is along its z, strength in m/s",
         type=bpy.types.Object,
-        poll=lambda _, thing: thing.field is not None and thing.field.type == "WIND",
+        poll=lambda _, thing: thing.field is not None and thing.field.type != "NONE",
     )
     flow: FloatVectorProperty(name="Flow", description="m/s", default=(0.0, 8.0, 0.0))
     simulated: BoolProperty(
@@ -79,6 +80,17 @@ class FlowborneSettings(bpy.types.PropertyGroup):
         default=math.radians(90.0),
         min=math.radians(0.1),
     )
+    rounds: IntProperty(
+        name="Rounds",
+        description="Times a cycle is played; the last is baked. 1: the animation is no cycle",
+        default=1,
+        min=1,
+    )
+    preroll: IntProperty(
+        name="Pre-roll",
+        description="Frames before the range in which bones settle; they are not baked",
+        min=0,
+    )
 
 
 class FlowbornePreferences(bpy.types.AddonPreferences):
@@ -96,8 +108,9 @@ class FlowbornePreferences(bpy.types.AddonPreferences):
         self.layout.prop(self, "engine")
 
 
-def start_job(context: Any, engine: str) -> Job:
-    """Export the active character, and start its run in a new folder next to the .blend.
+def start_job(context: Any, engine: str, only_check: bool = False) -> Job:
+    """Export the active character, and start its run, or only a check of its scene, in a new folder
+    next to the .blend.
 
     raises  one of ERRORS
     """
@@ -107,23 +120,43 @@ def start_job(context: Any, engine: str) -> Job:
     reaction = reaction_of(context, armature, settings)
     if not bpy.data.filepath:
         raise ReactionError("the run is written next to the .blend file: save it first")
-    blend = Path(bpy.data.filepath)
-    plain = re.sub(r"[^\w-]", "-", armature.name)
-    above = blend.with_name(f"{blend.stem}-flowborne")
-    number = 1 + sum(1 for _ in above.glob(f"{plain}-[0-9]*"))
-    job = Job(command, above / f"{plain}-{number}", reaction)
-    export_character(context, armature, job.folder / CHARACTER)
-    job.start()
-    settings.folder = bpy.path.relpath(str(job.folder))
+    numbers = folders_of(armature)
+    job = Job(command, _folder(armature, max(numbers, default=0) + 1), reaction)
+    earlier = 0 if reaction.loop else reaction.lead
+    export_character(context, armature, job.folder / CHARACTER, earlier)
+    job.start(only_check)
+    settings.folder = _relative(job.folder)
     JOBS[str(job.folder)] = job
     return job
+
+
+def _folder(armature: Any, number: int) -> Path:
+    blend = Path(bpy.data.filepath)
+    plain = re.sub(r"[^\w-]", "-", armature.name)
+    return blend.with_name(f"{blend.stem}-flowborne") / f"{plain}-{number}"
+
+
+def _relative(folder: Path) -> str:
+    return str(bpy.path.relpath(str(folder)))
+
+
+def folders_of(armature: Any) -> dict[int, Path]:
+    """Number -> folder of the jobs of an armature next to the .blend, in the order of numbers."""
+    plain = _folder(armature, 0)
+    start = plain.name[:-1]
+    ends = [path.name.removeprefix(start) for path in plain.parent.glob(f"{start}*")]
+    return {n: _folder(armature, n) for n in sorted(int(end) for end in ends if end.isdecimal())}
 
 
 def job_of(settings: Any, engine: str) -> Job:
     """The last job of an armature, also one of an earlier session. Raises one of ERRORS."""
     if not settings.folder:
         raise ReactionError("this armature has no run: start one")
-    folder = Path(bpy.path.abspath(settings.folder))
+    return job_in(Path(bpy.path.abspath(settings.folder)), engine)
+
+
+def job_in(folder: Path, engine: str) -> Job:
+    """The job of a folder, also one of an earlier session. Raises one of ERRORS."""
     if str(folder) not in JOBS:
         JOBS[str(folder)] = Job.load(engine_command(engine) if engine else (), folder)
     return JOBS[str(folder)]
@@ -151,6 +184,7 @@ class FlowborneRun(bpy.types.Operator):
     bl_label = "Run"
 
     resume: BoolProperty(options={"SKIP_SAVE"})
+    only_check: BoolProperty(options={"SKIP_SAVE"})
 
     def execute(self, context: Any) -> set[str]:
         with _reported(self):
@@ -159,7 +193,7 @@ class FlowborneRun(bpy.types.Operator):
                 self._job.engine = engine_command(engine_of(context))
                 self._job.start()
             else:
-                self._job = start_job(context, engine_of(context))
+                self._job = start_job(context, engine_of(context), self.only_check)
             manager = context.window_manager
             self._timer = manager.event_timer_add(PERIOD, window=context.window)
             manager.modal_handler_add(self)
@@ -208,20 +242,105 @@ class FlowborneBake(bpy.types.Operator):
             ("ALL", "All Bones", "All that the run moves"),
         ],
     )
+    thin: FloatProperty(
+        name="Thin Keys",
+        description="Leave keys out where a rotation changes by no more than this; 0 keeps all",
+        subtype="ANGLE",
+        min=0.0,
+    )
 
     def execute(self, context: Any) -> set[str]:
         with _reported(self):
             armature = armature_of(context)
             job = job_of(armature.flowborne, engine_of(context))
-            motion = read_motion(job.run)
+            reaction = job.reaction
+            motion = read_motion(job.run).after(reaction.lead, reaction.loop)
             chosen = {
-                "FREE": [*motion.moving[: job.reaction.floats], *job.reaction.bones],
+                "FREE": [*motion.moving[: reaction.floats], *reaction.bones],
                 "SELECTED": [bone.name for bone in armature.pose.bones if bone.select],
                 "ALL": motion.moving,
             }[self.bones]
-            reaction = job.reaction
-            strip = bake(context, armature, motion, reaction.first, reaction.unit, chosen)
-            self.report({"INFO"}, f"baked {len(chosen)} bones to '{strip.name}'")
+            place, thin = (reaction.first, reaction.unit), math.degrees(self.thin)
+            strip = bake(context, armature, motion, *place, chosen, thin)
+            done = f"baked {len(chosen)} bones to '{strip.name}'"
+            if reaction.loop and job.frames_done >= reaction.frames:
+                done += f"; the ends of the loop are {motion.ends_apart(chosen):.2g}° apart"
+            self.report({"INFO"}, done)
+            return {"FINISHED"}
+        return {"CANCELLED"}
+
+
+class FlowbornePreset(bpy.types.Operator):
+    """Select the bones whose names say that they are of this kind"""
+
+    bl_idname = "flowborne.preset"
+    bl_label = "Select by Name"
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012 - Blender's way
+
+    kind: EnumProperty(
+        name="Kind",
+        items=[(key, key.capitalize(), ", ".join(words)) for key, words in PRESETS.items()],
+    )
+
+    def execute(self, context: Any) -> set[str]:
+        with _reported(self):
+            armature = armature_of(context)
+            can_react = [
+                bone.name for bone in armature.data.bones if bone.use_deform and bone.parent
+            ]
+            found = preset(can_react, self.kind)
+            if not found:
+                raise ReactionError(
+                    f"no deforming bone below the root of '{armature.name}' has one of these words "
+                    f"in its name: {', '.join(PRESETS[self.kind])}. Select bones in Pose Mode"
+                )
+            _select(armature, found)
+            self.report({"INFO"}, f"selected {', '.join(found)}")
+            return {"FINISHED"}
+        return {"CANCELLED"}
+
+
+class FlowborneSelect(bpy.types.Operator):
+    """Select the bones that a warning names"""
+
+    bl_idname = "flowborne.select"
+    bl_label = "Select"
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012 - Blender's way
+
+    text: StringProperty(options={"HIDDEN"})
+
+    @classmethod
+    def description(cls, context: Any, properties: Any) -> str:
+        return str(properties.text)
+
+    def execute(self, context: Any) -> set[str]:
+        with _reported(self):
+            armature = armature_of(context)
+            _select(armature, [*named_in(self.text, armature.data.bones.keys())])
+            return {"FINISHED"}
+        return {"CANCELLED"}
+
+
+def _select(armature: Any, names: list[str]) -> None:
+    """Select these pose bones alone, and make the first one active."""
+    for bone in armature.pose.bones:
+        bone.select = bone.name in names
+    armature.data.bones.active = armature.data.bones[names[0]]
+
+
+class FlowborneChoose(bpy.types.Operator):
+    """Show this run, to bake or resume it"""
+
+    bl_idname = "flowborne.choose"
+    bl_label = "Choose"
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012 - Blender's way
+
+    number: IntProperty(options={"HIDDEN"})
+
+    def execute(self, context: Any) -> set[str]:
+        with _reported(self):
+            armature = armature_of(context)
+            armature.flowborne.folder = _relative(_folder(armature, self.number))
             return {"FINISHED"}
         return {"CANCELLED"}
 
@@ -230,8 +349,12 @@ def line_of(job: Job) -> str:
     """The state of a job in one line, or its message."""
     if job.message:
         return job.message
-    left, frames = job.seconds_left, f"frame {job.frames_done}/{job.reaction.frames}"
-    return f"{job.state.value}, {frames}" + ("" if left is None else f", {left:.0f} s left")
+    left, said = job.seconds_left, job.state.value
+    if job.state is not State.CHECKED:
+        said += f", frame {job.frames_done}/{job.reaction.frames}"
+    if left is not None:
+        return f"{said}, {left:.0f} s left"
+    return f"{said}: {job.cost}" if job.cost and job.state is not State.DONE else said
 
 
 class FlowbornePanel(bpy.types.Panel):
@@ -254,6 +377,7 @@ class FlowbornePanel(bpy.types.Panel):
         settings = armature.flowborne
         free = sum(bone.select for bone in armature.pose.bones)
         layout.label(text=f"{armature.name}: {free} free bones (selected in Pose Mode)")
+        layout.operator_menu_enum(FlowbornePreset.bl_idname, "kind")
         layout.prop(settings, "medium")
         if settings.medium == "OWN":
             layout.prop(settings, "own_density")
@@ -263,8 +387,10 @@ class FlowbornePanel(bpy.types.Panel):
         layout.prop(settings, "simulated")
         if settings.simulated:
             layout.prop(settings, "resolution")
-        for name in ("density", "floats", "objective", "follow", "strength"):
+        for name in ("density", "floats", "objective", "follow", "strength", "rounds"):
             layout.prop(settings, name)
+        if settings.rounds == 1:
+            layout.prop(settings, "preroll")
         try:
             job = job_of(settings, engine_of(context)) if settings.folder else None
         except ERRORS as error:
@@ -272,17 +398,56 @@ class FlowbornePanel(bpy.types.Panel):
             job = None
         if job is None or job.state not in ACTIVE:
             layout.operator(FlowborneRun.bl_idname)
+            layout.operator(FlowborneRun.bl_idname, text="Check").only_check = True
         if job is None:
             return
         for line in line_of(job).split("\n"):
             layout.label(text=line, icon="ERROR" if job.state is State.FAILED else "NONE")
         for warning in job.warnings:
-            layout.label(text=warning, icon="ERROR")
+            if any(named_in(warning, armature.data.bones.keys())):
+                layout.operator(FlowborneSelect.bl_idname, text=warning).text = warning
+            else:
+                layout.label(text=warning, icon="ERROR")
         if job.state in ACTIVE:
             layout.operator(FlowborneCancel.bl_idname)
         elif job.state is not State.DONE:
             layout.operator(FlowborneRun.bl_idname, text="Resume").resume = True
         layout.operator_menu_enum(FlowborneBake.bl_idname, "bones")
+
+
+class FlowborneRunsPanel(bpy.types.Panel):
+    """The runs of the active armature next to the .blend."""
+
+    bl_label = "Runs"
+    bl_idname = "FLOWBORNE_PT_runs"
+    bl_parent_id = FlowbornePanel.bl_idname
+    bl_category = FlowbornePanel.bl_category
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012 - Blender's way
+
+    @classmethod
+    def poll(cls, context: Any) -> bool:
+        return context.object is not None and bool(bpy.data.filepath)
+
+    def draw(self, context: Any) -> None:
+        try:
+            armature = armature_of(context)
+        except ReactionError:
+            return
+        chosen = bpy.path.abspath(armature.flowborne.folder)
+        for number, folder in folders_of(armature).items():
+            try:
+                job = job_in(folder, engine_of(context))
+            except ERRORS as error:
+                self.layout.label(text=str(error), icon="ERROR")
+                continue
+            line, *_ = line_of(job).split("\n")
+            name = FlowborneChoose.bl_idname
+            row = self.layout.operator(
+                name, text=f"{folder.name}: {line}", depress=str(folder) == chosen
+            )
+            row.number = number
 
 
 CLASSES = (
@@ -291,7 +456,11 @@ CLASSES = (
     FlowborneRun,
     FlowborneCancel,
     FlowborneBake,
+    FlowbornePreset,
+    FlowborneSelect,
+    FlowborneChoose,
     FlowbornePanel,
+    FlowborneRunsPanel,
 )
 
 

@@ -143,3 +143,20 @@ def test_engines(tmp_path: Path) -> None:
     with pytest.raises(JobError, match="cannot be started"):
         job.start()
     assert job.state is State.FAILED
+
+
+def test_a_check_says_warnings_and_cost_before_the_run(tmp_path: Path) -> None:
+    """The tail of the box is thinner than two of 16 cells; the run goes on from the check."""
+    job = new_job(tmp_path / "job", simulated=True, resolution=16, frames=2)
+    assert job.cost == ""
+    job.start(only_check=True)
+    assert finish(job) is State.CHECKED, job.message
+    assert any("tail" in warning for warning in job.warnings), job.warnings
+    cells, *_ = job.cost.split(" cells, ")
+    assert job.cost.endswith(" GB, about 1 min")
+    assert not job.run.exists()
+    again = Job.load(ENGINE, job.folder)
+    assert (again.warnings, again.cost) == (job.warnings, job.cost)
+    again.start()
+    assert finish(again) is State.DONE, again.message
+    assert fb.open_run(again.run).summary["cells"] == int(cells)

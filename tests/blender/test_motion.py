@@ -7,7 +7,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from blender.motion import MotionError, axes_only, basis, read_motion, same_side, shift, turns
+from blender.motion import (
+    Motion,
+    MotionError,
+    axes_only,
+    basis,
+    keys_within,
+    read_motion,
+    same_side,
+    shift,
+    turns,
+)
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
@@ -68,3 +78,37 @@ def test_a_run_without_frames_is_told(tmp_path: Path) -> None:
     (tmp_path / "states" / "000000.npz").write_bytes(b"cut")
     with pytest.raises(MotionError, match="has no frames to bake"):
         read_motion(tmp_path)
+
+
+def test_keys_within_a_tolerance_are_few() -> None:
+    """A quarter turn at constant rate and a rest need few keys."""
+    angles = np.radians([*np.linspace(0.0, 90.0, FRAMES), *[90.0] * FRAMES])
+    values = np.stack([np.cos(angles / 2), np.sin(angles / 2), 0 * angles, 0 * angles], axis=1)
+
+    def unit(found: np.ndarray) -> np.ndarray:
+        return found / np.linalg.norm(found, axis=1, keepdims=True)
+
+    kept = keys_within(values, unit, 1.0)
+    assert {0, FRAMES - 1, 2 * FRAMES - 1} <= {*kept}
+    assert len(kept) < 10
+    linear = [np.interp(np.arange(2 * FRAMES), kept, column[kept]) for column in values.T]
+    cosines = np.sum(unit(np.stack(linear, axis=1)) * values, axis=1)
+    assert np.degrees(2.0 * np.arccos(np.minimum(cosines, 1.0))).max() <= 1.0
+
+
+def test_the_last_round_is_moved_to_the_first() -> None:
+    """Each round of a cycle moves and turns the character on; a tail differs by 10 degrees."""
+    stride, shift_of = Rotation.from_euler("z", 30, degrees=True).as_matrix(), (1.0, 2.0, 0.0)
+    rotation, position = some(8, 4).reshape(4, 2, 3, 3), np.ones((4, 2, 3))
+    rotation = np.concatenate([rotation, stride @ rotation])
+    position = np.concatenate([position, position @ stride.T + shift_of])
+    rotation[7, 1] = rotation[7, 0] @ rotation[4, 0].T @ rotation[4, 1]
+    rotation[7, 1] = rotation[7, 1] @ Rotation.from_euler("y", 10, degrees=True).as_matrix()
+    run = Motion(("root", "tail"), ("root", "tail"), position, rotation)
+    last = run.after(4, loop=True)
+    assert_allclose(last.rotation[:3], run.rotation[:3], atol=1e-12)
+    assert_allclose(last.position, run.position[:4], atol=1e-12)
+    assert last.ends_apart(["root", "tail"]) == pytest.approx(10.0)
+    assert_allclose(run.after(4, loop=False).rotation, run.rotation[4:])
+    with pytest.raises(MotionError, match="the run has 7 frames, and the bake starts after 8"):
+        run.after(8, loop=False)

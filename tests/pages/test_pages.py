@@ -56,6 +56,7 @@ ELSEWHERE = {
     "python3 -m venv": "makes an environment; `make demo` does that",
     "python -m venv": "makes an environment for Blender, which is no part of the tests",
     "blender/bin/": "Blender is no part of the tests",
+    "make blender-sample": "installs Blender as a module",
     "pip install": "installs",
     "source": "is for a shell",
     "ssh": "needs another machine",

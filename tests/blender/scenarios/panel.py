@@ -39,6 +39,7 @@ new_scene()
 assert drawn() == ["no armature is active: select the armature of the character"]
 rig = character()
 assert "flowborne.run" in drawn()
+assert "Check" in drawn()
 assert "resolution" not in drawn()
 rig.flowborne.simulated = True
 assert "resolution" in drawn()
@@ -49,6 +50,7 @@ for state, shown in (
     (State.RUNNING, "flowborne.cancel"),
     (State.CANCELLED, "Resume"),
     (State.FAILED, "flowborne.bake"),
+    (State.CHECKED, "checked"),
 ):
     job.state = state
     assert shown in drawn(), drawn()
@@ -65,6 +67,7 @@ job = SimpleNamespace(
     message="",
     seconds_left=None,
     frames_done=3,
+    cost="",
     reaction=SimpleNamespace(frames=11),
     step=lambda: job.state,
     cancel=lambda: cancelled.append(job.state),

@@ -10,6 +10,7 @@ import json
 import math
 import sys
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -211,16 +212,16 @@ def check_equal(armature: Any, run: Path, bones: Sequence[str], unit: float = 1.
 def refusal(armature: Any, operator: str = "bake", **options: str) -> str:
     """The message with which an operator refuses."""
     bpy.context.view_layer.objects.active = armature
-    return message(RuntimeError, getattr(bpy.ops.flowborne, operator), **options)
+    return message(RuntimeError, partial(getattr(bpy.ops.flowborne, operator), **options))
 
 
-def message(kind: type[Exception], call: Callable[..., Any], *given: Any, **options: Any) -> str:
+def message(error: type[Exception], call: Callable[..., Any], *given: Any) -> str:
     """The message of an error that a call raises."""
     try:
-        call(*given, **options)
-    except kind as error:
-        return str(error)
-    raise AssertionError(f"{call} raised no {kind.__name__}")
+        call(*given)
+    except error as raised:
+        return str(raised)
+    raise AssertionError(f"{call} raised no {error.__name__}")
 
 
 def curves(action: Any) -> dict[tuple[str, int], list[tuple[float, float]]]:
