@@ -20,7 +20,7 @@ from numpy.testing import assert_array_equal
 
 import flowborne as fb
 from flowborne.base.errors import SceneError
-from flowborne.characters import usd_gate
+from flowborne.characters import apart
 from flowborne.characters.division import closed
 from flowborne.characters.gltf_document import inside
 from flowborne.characters.limits import check_frames, check_size, check_work
@@ -429,6 +429,6 @@ def test_a_usd_file_that_doubles_its_prims_at_each_level_ends(
     if ending == ".usdz":
         with zipfile.ZipFile(path, "w") as package:
             package.writestr("bomb.usda", text)
-    monkeypatch.setattr(usd_gate, "PROBE_SECONDS", 2.0)
+    monkeypatch.setattr(apart, "MAX_SECONDS", 2.0)
     with pytest.raises(SceneError, match=rf"bomb{ending} cannot be read as USD"):
         read_source(path)

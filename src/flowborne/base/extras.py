@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from importlib import import_module
+from importlib.metadata import PackageNotFoundError, distribution
 from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
 from flowborne.base.errors import SceneError
@@ -47,6 +49,16 @@ def check_mesher() -> None:
     """Raise SceneError where fTetWild is not installed; a process of its own imports it."""
     if find_spec("pytetwild") is None:
         raise _missing("pytetwild", "flesh", "meshes of flesh", "made")
+
+
+def assimp() -> Path:
+    """The folder with Assimp's bin and lib, by which .fbx files are read. Raises SceneError when it
+    is not there."""
+    try:
+        return Path(str(distribution("cmeel-assimp").locate_file("cmeel.prefix")))
+    except PackageNotFoundError:
+        package = "cmeel-assimp (for Linux and macOS)"
+        raise _missing(package, "fbx", "characters in '.fbx' files", "read") from None
 
 
 def missing_to_draw() -> str | None:

@@ -78,7 +78,7 @@ def import_character(
     The character floats in a box of water, and its joints follow the clip. Users are expected to
     edit the scene.
 
-    file        .glb, .gltf or USD with a skeleton and a surface bound to it
+    file        .glb, .gltf, .fbx or USD with a skeleton and a surface bound to it
     out         folder, created if missing
     clip        name of the clip; the only one by default
     animations  file of the clip, with joints of the same names; `file` by default

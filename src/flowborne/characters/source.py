@@ -10,13 +10,7 @@ from flowborne.base.extras import optional
 from flowborne.characters.rig import Action, Rig, Surface
 
 GLTF, USD = (".glb", ".gltf", ".vrm"), (".usd", ".usda", ".usdc", ".usdz")
-
-BLENDER = (
-    'blender --background --python-expr "import bpy; bpy.ops.wm.read_factory_settings('
-    "use_empty=True); bpy.ops.import_scene.fbx(filepath='{name}'); "
-    "bpy.ops.export_scene.gltf(filepath='{stem}.glb')\""
-)
-"""Command that converts an .fbx file to a .glb file."""
+FORMATS = (*GLTF, ".fbx", *USD)
 
 
 class Source(Protocol):
@@ -50,16 +44,10 @@ def read_source(path: Path) -> Source:
     raises  SceneError when it is missing, of another format, or cannot be read
     """
     ending = path.suffix.lower()
-    if ending == ".fbx":
-        how = BLENDER.format(name=path.name, stem=path.stem)
+    if ending not in FORMATS:
         raise SceneError(
-            f"{path.name}: .fbx is a proprietary format and not supported. Make a .glb of it, in "
-            f"Blender with File, Import and File, Export, or with: {how}"
-        )
-    if ending not in (*GLTF, *USD):
-        raise SceneError(
-            f"{path.name} is none of {', '.join((*GLTF, *USD))}. Export the character in one of "
-            "these formats."
+            f"{path.name} is none of {', '.join(FORMATS)}. Export the character in one of these "
+            "formats."
         )
     try:
         if not path.is_file():
@@ -70,6 +58,10 @@ def read_source(path: Path) -> Source:
         from flowborne.characters.gltf import GltfSource
 
         return GltfSource(path)
+    if ending == ".fbx":
+        from flowborne.characters.fbx import read_fbx
+
+        return read_fbx(path)
     optional("pxr.Usd", "usd-core", "usd", f"characters in '{ending}' files", verb="read")
     from flowborne.characters.usd import UsdSource
 

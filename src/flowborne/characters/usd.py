@@ -20,6 +20,7 @@ from pxr import Usd, UsdGeom, UsdShade, UsdSkel
 
 from flowborne.base.colours import to_srgb
 from flowborne.base.errors import SceneError
+from flowborne.characters.apart import limit_memory
 from flowborne.characters.limits import MAX_POSES, check_size, wrong
 from flowborne.characters.rig import (
     PLAIN,
@@ -39,9 +40,6 @@ from flowborne.characters.usd_gate import EVERYTHING, open_stage, reading_usd
 from flowborne.kernels.arrays import Array, Integers
 
 Result = TypeVar("Result")
-
-MAX_MEMORY = 8 << 30
-"""Limit of the address space of that process, bytes; Windows has no such limit."""
 
 
 def _reading(method: Callable[..., Result]) -> Callable[..., Result]:
@@ -297,11 +295,7 @@ def _triangles(mesh: UsdGeom.Mesh, points: int, mirrored: bool, where: str) -> I
 
 def read_all(path: Path) -> None:
     """Read all that an import reads. The calling process reports errors."""
-    if sys.platform != "win32":
-        import resource
-
-        resource.setrlimit(resource.RLIMIT_AS, (MAX_MEMORY, MAX_MEMORY))
-        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    limit_memory()
     with suppress(SceneError):
         source = UsdSource(path, probed=True)
         _ = source.rig, source.surface

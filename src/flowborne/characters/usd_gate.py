@@ -1,6 +1,5 @@
 """Opening of a USD file, checked before an import uses it.
 
-A damaged binary file can crash the process that reads it, and no check in that process prevents it.
 Another process reads it first.
 
 source  OpenUSD: SdfLayer.GetCompositionAssetDependencies
@@ -9,8 +8,6 @@ source  OpenUSD: SdfLayer.GetCompositionAssetDependencies
 from __future__ import annotations
 
 import os
-import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stderr
 from pathlib import Path
@@ -20,15 +17,13 @@ import numpy as np
 from pxr import Ar, Sdf, Tf, Usd
 
 from flowborne.base.errors import SceneError
-from flowborne.characters.limits import MAX_FILE_BYTES, wrong
+from flowborne.characters.apart import check_bytes, run_apart
+from flowborne.characters.limits import wrong
 
 EVERYTHING = Usd.TraverseInstanceProxies(Usd.PrimAllPrimsPredicate)
 
 MAX_LAYERS = 1000
 MAX_PRIMS = 100_000
-
-PROBE_SECONDS = 300.0
-"""Time limit of the other process, s."""
 
 
 def open_stage(path: Path, *, probed: bool = False) -> Usd.Stage:
@@ -71,23 +66,7 @@ def open_stage(path: Path, *, probed: bool = False) -> Usd.Stage:
 
 def probe(path: Path) -> None:
     """Raise SceneError unless another process can read a file."""
-    command = [sys.executable, "-P", "-m", "flowborne.characters.usd", str(path)]
-    nowhere = subprocess.DEVNULL
-    try:
-        done = subprocess.run(
-            command,
-            stdin=nowhere,
-            stdout=nowhere,
-            stderr=nowhere,
-            timeout=PROBE_SECONDS,
-            check=False,
-        )
-    except subprocess.TimeoutExpired:
-        raise SceneError(
-            f"{path.name} cannot be read as USD within {PROBE_SECONDS:g} s. Export a smaller "
-            "character."
-        ) from None
-    if done.returncode:
+    if run_apart("flowborne.characters.usd", "USD", path)[0]:
         raise wrong(f"{path.name} cannot be read as USD: reading it crashes the process")
 
 
@@ -114,11 +93,7 @@ def reading_usd(name: str) -> Iterator[None]:
 def _layer(name: str, where: str) -> Sdf.Layer:
     """The layer of a file, or of a file within a package."""
     file = Path(Ar.SplitPackageRelativePathOuter(name)[0])
-    if (size := file.stat().st_size) > MAX_FILE_BYTES:
-        raise SceneError(
-            f"{where} has {size / 2**30:.3g} GB; the maximum is {MAX_FILE_BYTES / 2**30:g} GB. "
-            "Export fewer meshes and clips."
-        )
+    check_bytes(file.stat().st_size, where)
     layer = Sdf.Layer.FindOrOpen(name)
     if layer is None:
         raise wrong(f"{where} cannot be read as USD")

@@ -164,7 +164,7 @@ def study(
 @command(MAKE, "flowborne import whale.glb --clip Swim --out whale", "import")
 def import_(
     file: Annotated[
-        Path, typer.Argument(metavar="FILE", help="Rigged character: .glb, .gltf, .usd.")
+        Path, typer.Argument(metavar="FILE", help="Rigged character: .glb, .gltf, .fbx, .usd.")
     ],
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder to write.")],
     clip: Annotated[
