@@ -17,6 +17,7 @@ from flowborne.coupling.world import Setup
 from flowborne.kernels.arrays import Array, Integers, Mask
 from flowborne.runs.history import OF_BODIES, POSE, body_columns, joint_column
 from flowborne.sim.frame import FrameReport, Snapshot
+from flowborne.solids.ellipsoids import EllipsoidModel
 from flowborne.solids.geoms import quaternion_of
 from flowborne.solids.model import HINGE, SLIDE, SolidModel
 from flowborne.solids.motors import activations_of, inputs_of, outputs_of
@@ -71,6 +72,8 @@ class Columns:
                                                 without the added-mass part
       added_mass_drag_N, added_mass_lift_N      with which the fluid resists the bodies'
                                                 acceleration; both together are the whole force
+      ellipsoid_drag_N, ellipsoid_power_W       force along the stream and power taken from the
+                                                bodies by MuJoCo's ellipsoid fluid model
       effort                                    |drive force| dt over the controlled dofs, N m s
       work_J                                    that the drives did in the frame
       applied_force_<body>_x_N … _z_N           sum of the forces from outside on each body on which
@@ -107,6 +110,7 @@ class Columns:
         told: tuple[str, ...] = (),
         actuators: tuple[str, ...] = (),
         pushed: tuple[str, ...] = (),
+        ellipsoids: EllipsoidModel | None = None,
     ) -> None:
         self._controller = controller
         dofs = np.zeros(0, np.int64) if controller is None else controller.dofs
@@ -118,6 +122,7 @@ class Columns:
             Quantity(sensor_columns(setup.solid), sensor_values, False),
             *of_objective(controller),
             *of_forces(stream, dofs),
+            *of_ellipsoids(ellipsoids, stream),
             *of_applied(setup, pushed),
             *of_bodies(setup.solid, bodies),
             *of_fluid(setup),
@@ -298,6 +303,23 @@ def of_forces(stream: tuple[float, ...] | None, controlled: Integers) -> Iterato
     yield Quantity(names, forces, splits=True)
     yield Quantity(["effort"], effort)
     yield of_steps("work")
+
+
+def of_ellipsoids(
+    flow: EllipsoidModel | None, stream: tuple[float, ...] | None
+) -> Iterator[Quantity]:
+    """What MuJoCo's ellipsoid fluid model would give for the motion at the frame's end."""
+    if flow is None:
+        return
+    along, _ = axes_of(stream)
+
+    def values(now: Snapshot) -> list[float]:
+        if np.isnan(now.sensed.dt):
+            return [np.nan, np.nan]
+        force, power = flow.force_and_power(now.sensed.pose, now.sensed.velocity)
+        return [float(force @ along), power]
+
+    yield Quantity(["ellipsoid_drag_N", "ellipsoid_power_W"], values, False)
 
 
 def of_applied(setup: Setup, told: tuple[str, ...]) -> Iterator[Quantity]:

@@ -29,6 +29,7 @@ from flowborne.scenes.actuators import joints_of_actuators, scene_controls
 from flowborne.scenes.changes import ChangeTable, values_at
 from flowborne.sim.columns import Columns
 from flowborne.sim.frame import PARTS, FrameReport, Snapshot
+from flowborne.solids.ellipsoids import EllipsoidModel
 from flowborne.solids.flesh import inversion
 from flowborne.solids.model import FREE, turning_dofs
 from flowborne.solids.motors import activations_of, driven_by, outputs_of
@@ -119,6 +120,10 @@ class Simulation:
         policy = self.scene.policy
         told, pushed = ((), ()) if policy is None else (policy.joints, policy.bodies)
         told += joints_of_actuators(model, actuators)
+        ellipsoids, fluid = None, built.world.setup.fluid
+        if output.ellipsoid_model and fluid is not None:
+            uniform = self.scene.fluid_velocity()
+            ellipsoids = EllipsoidModel(model, fluid.density, fluid.viscosity, uniform)
         self.columns = Columns(
             built.world.setup,
             self.controller,
@@ -128,6 +133,7 @@ class Simulation:
             told,
             actuators,
             pushed,
+            ellipsoids,
         )
         self._controls = scene_controls(self.scene.actuator, model, self.scene.constants)
         self._changes: tuple[ChangeTable, ...] = self.scene.changes
