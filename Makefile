@@ -1,11 +1,12 @@
 PYTHON ?= python3
 VENV := .venv
-BIN := $(VENV)/bin
+BIN := $(VENV)/$(if $(filter Windows_NT,$(OS)),Scripts,bin)
+TIER ?= minute
 
 # Every process would compile the package anew, a fifth of what it takes to start.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: baselines closeness demo lint test browser dist docs gltf-validator imports failing same-figures gallery paper exporters fuzz messages size strangers validation-page clean
+.PHONY: baselines bench-history bench-pages closeness demo lint test browser dist docs gltf-validator imports failing same-figures gallery paper exporters fuzz messages size strangers validation-page workflows clean
 
 demo: $(VENV)/installed
 	$(BIN)/flowborne run ns-block-drag-max --out runs/ns-block-drag-max --replace
@@ -24,7 +25,11 @@ browser: $(VENV)/installed-test
 	FLOWBORNE_SCREENSHOTS=runs/viewer $(BIN)/pytest -rs -m browser --numprocesses 0 tests/view/browser
 
 dist: $(VENV)/installed-test
+	$(BIN)/python -m pip install --quiet --group dist
+	$(BIN)/validate-pyproject pyproject.toml validation/pyproject.toml
 	$(BIN)/python tools/dist.py
+	$(BIN)/twine check --strict dist/*/*
+	$(BIN)/check-wheel-contents dist/*/*.whl
 
 docs: $(VENV)/installed-test
 	$(BIN)/python -m sphinx -W --keep-going -q -b html docs build/docs
@@ -50,9 +55,9 @@ validation-page: $(VENV)/installed-test
 	$(BIN)/python tools/validation_page.py
 
 same-figures: $(VENV)/installed-test
-	rm -rf build/minute
-	-$(BIN)/flowborne validate --report build/minute
-	$(BIN)/python tools/same_figures.py build/minute
+	rm -rf build/report
+	-$(BIN)/flowborne validate --tier $(TIER) --report build/report
+	$(BIN)/python tools/same_figures.py build/report $(TIER)
 
 exporters: $(VENV)/installed-test
 	$(BIN)/python tools/exporters.py
@@ -76,15 +81,31 @@ baselines: $(VENV)/installed-test
 	$(BIN)/python tools/baselines.py $(NAMES)
 	$(BIN)/python tools/learning_page.py
 
-$(VENV)/bin/python:
-	$(PYTHON) -m venv $(VENV)
+workflows: $(VENV)/made
+	$(BIN)/python -m pip install --quiet --upgrade pip
+	$(BIN)/python -m pip install --quiet --group workflows
+	$(BIN)/actionlint
+	$(BIN)/zizmor --offline .github
 
-$(VENV)/installed: pyproject.toml validation/pyproject.toml $(VENV)/bin/python
+bench-history: $(VENV)/installed-test
+	$(BIN)/python -m pip install --quiet --group bench
+	$(BIN)/asv machine --yes --config validation/asv.conf.json
+	$(BIN)/asv run --config validation/asv.conf.json --environment existing:same --set-commit-hash $$(git rev-parse HEAD)
+
+bench-pages: $(VENV)/installed-test
+	$(BIN)/python -m pip install --quiet --group bench
+	$(BIN)/asv publish --config validation/asv.conf.json --html-dir build/docs/benchmarks
+
+$(VENV)/made:
+	$(PYTHON) -m venv $(VENV)
+	touch $@
+
+$(VENV)/installed: pyproject.toml validation/pyproject.toml $(VENV)/made
 	$(BIN)/python -m pip install --quiet --upgrade pip
 	$(BIN)/python -m pip install --quiet --editable '.[film]' --editable ./validation
 	touch $@
 
-$(VENV)/installed-test: pyproject.toml validation/pyproject.toml $(VENV)/bin/python
+$(VENV)/installed-test: pyproject.toml validation/pyproject.toml $(VENV)/made
 	$(BIN)/python -m pip install --quiet --upgrade pip
 	$(BIN)/python -m pip install --quiet --editable '.[test]' --editable './validation[bench]'
 	touch $@ $(VENV)/installed
