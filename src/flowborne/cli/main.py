@@ -7,6 +7,7 @@ is one message on stderr.
 
 from __future__ import annotations
 
+import json
 import logging
 import os
 import sys
@@ -501,6 +502,14 @@ def chains(
     print(f"written: {made}")
     for note in notes:
         print(f"  {note}")
+
+
+@app.command()
+def schema() -> None:
+    """Print the JSON schema of a scene, by which editors complete its keys."""
+    from flowborne.scenes.json_schema import json_schema
+
+    print(json.dumps(json_schema(), indent=2))
 
 
 @app.command()

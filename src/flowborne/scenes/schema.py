@@ -112,7 +112,12 @@ class OutputTable(Table):
     bodies: tuple[Text, ...] = ()
     joints: SwitchOrNames = True
     ellipsoid_model: bool = False
-    exports: tuple[Annotated[ExportTable, BeforeValidator(_named_file)], ...] = ()
+    exports: tuple[
+        Annotated[
+            ExportTable, BeforeValidator(_named_file, json_schema_input_type=str | ExportTable)
+        ],
+        ...,
+    ] = ()
 
 
 class Kept(dict[str, Any]):
