@@ -6,7 +6,7 @@ TIER ?= minute
 # Every process would compile the package anew, a fifth of what it takes to start.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: baselines bench-history bench-pages closeness demo lint test browser dist docs gltf-validator imports failing same-figures gallery paper exporters fuzz messages size strangers validation-page workflows clean
+.PHONY: baselines bench-history bench-pages closeness demo lint test browser dist docs gltf-validator imports joss failing same-figures gallery paper exporters fuzz messages size strangers validation-page workflows clean
 
 demo: $(VENV)/installed
 	$(BIN)/flowborne run ns-block-drag-max --out runs/ns-block-drag-max --replace
@@ -47,6 +47,9 @@ failing: $(VENV)/installed-test
 
 gallery: $(VENV)/installed-test
 	$(BIN)/python tools/gallery.py $(NAMES)
+
+joss: $(VENV)/installed-test
+	$(BIN)/python tools/joss.py
 
 paper: $(VENV)/installed-test
 	$(BIN)/python tools/paper.py
