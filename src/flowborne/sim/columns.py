@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -50,6 +50,15 @@ class Quantity:
     values: Callable[[Any], Iterable[float]]
     of_step: bool = True
     splits: bool = False
+
+
+class Outside(NamedTuple):
+    """Names of the joints and actuators that are told from outside, and of the bodies that are
+    pushed."""
+
+    joints: tuple[str, ...] = ()
+    actuators: tuple[str, ...] = ()
+    bodies: tuple[str, ...] = ()
 
 
 class Columns:
@@ -107,9 +116,7 @@ class Columns:
         stream: tuple[float, ...] | None = None,
         bodies: tuple[str, ...] = (),
         joints: bool | tuple[str, ...] = True,
-        told: tuple[str, ...] = (),
-        actuators: tuple[str, ...] = (),
-        pushed: tuple[str, ...] = (),
+        outside: Outside = Outside(),  # noqa: B008 (never changes)
         ellipsoids: EllipsoidModel | None = None,
     ) -> None:
         self._controller = controller
@@ -117,13 +124,13 @@ class Columns:
         self.controlled = controlled_positions(setup.solid, dofs)
         quantities = (
             Quantity(("frame", "time_s"), lambda now: (now.frame, now.world.time), False),
-            *of_joints(setup, dofs, joints, told),
-            *of_actuators(setup.solid, actuators),
+            *of_joints(setup, dofs, joints, outside.joints),
+            *of_actuators(setup.solid, outside.actuators),
             Quantity(sensor_columns(setup.solid), sensor_values, False),
             *of_objective(controller),
             *of_forces(stream, dofs),
             *of_ellipsoids(ellipsoids, stream),
-            *of_applied(setup, pushed),
+            *of_applied(setup, outside.bodies),
             *of_bodies(setup.solid, bodies),
             *of_fluid(setup),
         )

@@ -27,7 +27,7 @@ from flowborne.kernels.jit import LARGE, cores, kernel_threads
 from flowborne.runs.summary import BUDGET_OPEN
 from flowborne.scenes.actuators import joints_of_actuators, scene_controls
 from flowborne.scenes.changes import ChangeTable, values_at
-from flowborne.sim.columns import Columns
+from flowborne.sim.columns import Columns, Outside
 from flowborne.sim.frame import PARTS, FrameReport, Snapshot
 from flowborne.solids.ellipsoids import EllipsoidModel
 from flowborne.solids.flesh import inversion
@@ -115,9 +115,8 @@ class Simulation:
         self.frame_time = built.frame_time
         self.steps_per_frame = built.steps_per_frame
         self.frames = built.frames
-        output, stream = self.scene.output, self.scene.stream()
-        model, actuators = built.world.setup.solid, self.scene.told_actuators()
-        policy = self.scene.policy
+        output, model = self.scene.output, built.world.setup.solid
+        actuators, policy = self.scene.told_actuators(), self.scene.policy
         told, pushed = ((), ()) if policy is None else (policy.joints, policy.bodies)
         told += joints_of_actuators(model, actuators)
         ellipsoids, fluid = None, built.world.setup.fluid
@@ -127,12 +126,10 @@ class Simulation:
         self.columns = Columns(
             built.world.setup,
             self.controller,
-            stream,
+            self.scene.stream(),
             output.bodies,
             output.joints,
-            told,
-            actuators,
-            pushed,
+            Outside(told, actuators, pushed),
             ellipsoids,
         )
         self._controls = scene_controls(self.scene.actuator, model, self.scene.constants)
