@@ -2,6 +2,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/$(if $(filter Windows_NT,$(OS)),Scripts,bin)
 TIER ?= minute
+MACHINE ?= local
 
 # Every process would compile the package anew, a fifth of what it takes to start.
 unexport PYTHONDONTWRITEBYTECODE
@@ -92,8 +93,8 @@ workflows: $(VENV)/made
 
 bench-history: $(VENV)/installed-test
 	$(BIN)/python -m pip install --quiet --group bench
-	$(BIN)/asv machine --yes --config validation/asv.conf.json
-	$(BIN)/asv run --config validation/asv.conf.json --environment existing:same --set-commit-hash $$(git rev-parse HEAD)
+	$(BIN)/asv machine --yes --machine $(MACHINE) --config validation/asv.conf.json
+	$(BIN)/asv run --config validation/asv.conf.json --machine $(MACHINE) --environment existing:same --set-commit-hash $$(git rev-parse HEAD)
 
 bench-pages: $(VENV)/installed-test
 	$(BIN)/python -m pip install --quiet --group bench
