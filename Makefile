@@ -1,6 +1,8 @@
 PYTHON ?= python3
 VENV := .venv
-BIN := $(VENV)/bin
+BIN := $(VENV)/$(if $(filter Windows_NT,$(OS)),Scripts,bin)
+TIER ?= minute
+MACHINE ?= local
 
 # Blender's Python: `make blender BPY=5.3.0 BLENDER_PYTHON=python3.13`
 BPY ?= 5.0.1
@@ -10,7 +12,7 @@ BPY_VENV := build/bpy-$(BPY)
 # Every process would compile the package anew, a fifth of what it takes to start.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: baselines chapters closeness demo lint test browser dist docs gltf-validator imports failing films same-figures gallery paper exporters fuzz messages size speed strangers validation-page clean blender blender-sample
+.PHONY: baselines bench-history bench-pages blender blender-sample browser chapters clean closeness demo dist docs exporters failing films fuzz gallery gltf-validator imports joss lint messages paper same-figures size speed strangers test validation-page workflows
 
 demo: $(VENV)/installed
 	$(BIN)/flowborne run ns-block-drag-max --out runs/ns-block-drag-max --replace
@@ -39,7 +41,11 @@ blender-sample: $(VENV)/installed
 	$(BPY_VENV)/bin/python tools/blender_sample.py --engine $(VENV) --out build/blender-sample
 
 dist: $(VENV)/installed-test
+	$(BIN)/python -m pip install --quiet --group dist
+	$(BIN)/validate-pyproject pyproject.toml validation/pyproject.toml
 	$(BIN)/python tools/dist.py
+	$(BIN)/twine check --strict dist/*/*
+	$(BIN)/check-wheel-contents dist/*/*.whl
 
 docs: $(VENV)/installed-test
 	$(BIN)/python -m sphinx -W --keep-going -q -b html docs build/docs
@@ -64,6 +70,9 @@ chapters: $(VENV)/installed-test
 gallery: $(VENV)/installed-test
 	$(BIN)/python tools/gallery.py $(NAMES)
 
+joss: $(VENV)/installed-test
+	$(BIN)/python tools/joss.py
+
 paper: $(VENV)/installed-test
 	$(BIN)/python tools/paper.py
 
@@ -74,9 +83,9 @@ speed: $(VENV)/installed-test
 	NUMBA_NUM_THREADS=1 $(BIN)/python tools/accuracy.py
 
 same-figures: $(VENV)/installed-test
-	rm -rf build/minute
-	-$(BIN)/flowborne validate --report build/minute
-	$(BIN)/python tools/same_figures.py build/minute
+	rm -rf build/report
+	-$(BIN)/flowborne validate --tier $(TIER) --report build/report
+	$(BIN)/python tools/same_figures.py build/report $(TIER)
 
 exporters: $(VENV)/installed-test
 	$(BIN)/python tools/exporters.py
@@ -100,15 +109,31 @@ baselines: $(VENV)/installed-test
 	$(BIN)/python tools/baselines.py $(NAMES)
 	$(BIN)/python tools/learning_page.py
 
-$(VENV)/bin/python:
-	$(PYTHON) -m venv $(VENV)
+workflows: $(VENV)/made
+	$(BIN)/python -m pip install --quiet --upgrade pip
+	$(BIN)/python -m pip install --quiet --group workflows
+	$(BIN)/actionlint
+	$(BIN)/zizmor --offline .github
 
-$(VENV)/installed: pyproject.toml validation/pyproject.toml $(VENV)/bin/python
+bench-history: $(VENV)/installed-test
+	$(BIN)/python -m pip install --quiet --group bench
+	$(BIN)/asv machine --yes --machine $(MACHINE) --config validation/asv.conf.json
+	$(BIN)/asv run --config validation/asv.conf.json --machine $(MACHINE) --environment existing:same --set-commit-hash $$(git rev-parse HEAD)
+
+bench-pages: $(VENV)/installed-test
+	$(BIN)/python -m pip install --quiet --group bench
+	$(BIN)/asv publish --config validation/asv.conf.json --html-dir build/docs/benchmarks
+
+$(VENV)/made:
+	$(PYTHON) -m venv $(VENV)
+	touch $@
+
+$(VENV)/installed: pyproject.toml validation/pyproject.toml $(VENV)/made
 	$(BIN)/python -m pip install --quiet --upgrade pip
 	$(BIN)/python -m pip install --quiet --editable '.[film]' --editable ./validation
 	touch $@
 
-$(VENV)/installed-test: pyproject.toml validation/pyproject.toml $(VENV)/bin/python
+$(VENV)/installed-test: pyproject.toml validation/pyproject.toml $(VENV)/made
 	$(BIN)/python -m pip install --quiet --upgrade pip
 	$(BIN)/python -m pip install --quiet --editable '.[test]' --editable './validation[bench]'
 	touch $@ $(VENV)/installed

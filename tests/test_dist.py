@@ -77,7 +77,7 @@ def test_the_wheel_holds_the_package_and_its_data(archives: tuple[Path, Path]) -
     assert len(DATA) > 40
     assert held >= DATA
     described = {name for name in held if ".dist-info/" in name}
-    assert held - described == files(ROOT, ".py") | DATA
+    assert held - described == files(ROOT, ".py") | DATA | {"flowborne/py.typed"}
     assert licences(held) == {"LICENSE"}
 
 

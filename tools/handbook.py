@@ -8,8 +8,10 @@ columns of names and meanings, indented formulas.
 
 from __future__ import annotations
 
+import json
 import re
 from html import escape
+from pathlib import Path
 from typing import Any
 
 from docutils import nodes
@@ -27,6 +29,7 @@ import scene_keys
 import symbols
 import validation_table
 from docstrings import entries, paragraphs
+from flowborne.scenes.json_schema import json_schema
 
 MAKERS = {
     module.__name__: module
@@ -156,8 +159,16 @@ class Diagram(SphinxDirective):
         ]
 
 
+def published_schema(app: Sphinx, error: Exception | None) -> None:
+    """Put the JSON schema of scenes beside the pages."""
+    if error is None:
+        text = json.dumps(json_schema(), indent=2)
+        (Path(app.outdir) / "scene.schema.json").write_text(text, encoding="utf-8")
+
+
 def setup(app: Sphinx) -> dict[str, bool]:
     app.connect("source-read", made_parts)
+    app.connect("build-finished", published_schema)
     app.connect("autodoc-process-docstring", structured)
     app.connect("autodoc-process-signature", readable)
     app.connect("autodoc-skip-member", skipped)

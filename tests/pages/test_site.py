@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import subprocess
 import sys
@@ -14,6 +15,7 @@ from pydantic import BaseModel
 import flowborne
 import scene_keys
 from docstrings import entries, meanings, prose
+from flowborne.scenes.json_schema import json_schema
 from flowborne.scenes.load import scene_names
 from flowborne.scenes.schema import Scene
 
@@ -104,6 +106,11 @@ def test_every_key_of_a_scene_is_there_with_its_meaning(site: Path) -> None:
                 assert scene_keys.meaning_of(model, name), f"{model.__name__}.{name}"
             elif is_section:
                 assert f"[{name}]" in text
+
+
+def test_the_schema_of_scenes_is_published(site: Path) -> None:
+    assert json.loads((site / "scene.schema.json").read_text("utf-8")) == json_schema()
+    assert 'href="scene.schema.json"' in (site / "scene-keys.html").read_text("utf-8")
 
 
 def test_every_built_in_scene_is_listed(site: Path) -> None:

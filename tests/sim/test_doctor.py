@@ -125,3 +125,19 @@ def test_only_what_a_run_needs_is_a_failure(
     assert left == code
     assert f"{name} is not installed; " in lines[row]
     assert lines[row].startswith("missing" if code else "optional")
+
+
+@pytest.mark.parametrize(("number", "missing"), [("4.0.1", False), ("3.17.0", True)])
+def test_mujoco_and_mujoco_core_share_a_folder(
+    monkeypatch: pytest.MonkeyPatch, number: str, missing: bool
+) -> None:
+    assert "share" not in doctor.finding("MuJoCo").found
+    monkeypatch.setattr(
+        doctor, "version", lambda name: number if name == "mujoco" else version(name)
+    )
+    finding = doctor.finding("MuJoCo")
+    assert finding.missing is missing
+    assert f"mujoco {number} and mujoco-core {version('mujoco-core')} share the folder /" in (
+        finding.found
+    )
+    assert bool(finding.remedy) is missing

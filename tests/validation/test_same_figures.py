@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from flowborne_validation.case import Tier
 from flowborne_validation.report import Case, Data
 from same_figures import differences
 
@@ -45,3 +46,11 @@ def test_a_verdict_and_what_is_in_one_report_only_differ() -> None:
     ]
     assert len(differences({}, kept)) == 2
     assert not differences({}, report(finding("drag", 5.6), tier="all"))
+
+
+def test_of_longer_tiers_a_verdict_alone_differs() -> None:
+    kept = report(finding("drag", 5.6), finding("lift", 1.0), tier="half-hour")
+    fresh = report(finding("drag", 6.6), finding("lift", 1.0, "fail"), tier="half-hour")
+    assert not differences(fresh, kept)
+    for tier in (Tier.HALF_HOUR, Tier.ALL):
+        assert differences(fresh, kept, tier) == ["B1: lift: 1.0 (fail), committed 1.0 (pass)"]

@@ -18,6 +18,12 @@ DRAWING = {
 }
 """Modules that films and pictures are drawn with -> their packages."""
 
+REINSTALL_MUJOCO = (
+    "pip uninstall --yes mujoco mujoco-core, then pip install 'mujoco-core>=4.0.1,<5' "
+    "(programs that need mujoco find MuJoCo there, too)"
+)
+"""How to mend an installation of MuJoCo."""
+
 
 def optional(module: str, package: str, extra: str, what: str, verb: str = "made") -> Any:
     """A module that may not be installed.

@@ -119,7 +119,10 @@ def _as_one(values: tuple[float, ...]) -> float | tuple[float, ...]:
 
 
 JointValues = Annotated[
-    tuple[Number, ...], BeforeValidator(_as_several), PlainSerializer(_as_one), Field(min_length=1)
+    tuple[Number, ...],
+    BeforeValidator(_as_several, json_schema_input_type=float | tuple[float, ...]),
+    PlainSerializer(_as_one),
+    Field(min_length=1),
 ]
 """One number for a hinge or a slide, several for a ball or a free joint."""
 

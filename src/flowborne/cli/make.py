@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -214,3 +215,11 @@ def chains(
     print(f"written: {made}")
     for note in notes:
         print(f"  {note}")
+
+
+@command(MAKE, "flowborne schema > scene.schema.json")
+def schema() -> None:
+    """Print the JSON schema of a scene, by which editors complete its keys."""
+    from flowborne.scenes.json_schema import json_schema
+
+    print(json.dumps(json_schema(), indent=2))

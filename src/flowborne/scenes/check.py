@@ -49,6 +49,7 @@ def cross_check(draft: Draft) -> list[str]:
         *check_dimensions(draft),
         *check_fluid(draft),
         *check_without_bodies(draft),
+        *check_ellipsoids(draft),
     ]
     has_model = scene.solids is not None
     flesh = check_flesh(draft, scene.flesh, slab=scene.is_slab, has_model=has_model)
@@ -115,11 +116,29 @@ def check_without_bodies(draft: Draft) -> Iterator[str]:
     if draft.scene.has_bodies or not draft.sound("solids", "human"):
         return
     found = [(draft.at(table), "table") for table in NEEDS_BODIES if draft.gives(table)]
-    for key in ("bodies", "joints"):
-        if getattr(draft.scene.output, key) not in (True, False, ()):
+    defaults = type(draft.scene.output)()
+    for key in ("bodies", "joints", "ellipsoid_model"):
+        if getattr(draft.scene.output, key) not in (getattr(defaults, key), False):
             found.append((draft.at("output", key), "key"))
     for where, what in found:
         yield f"{where}: there are no bodies. Add [solids] with a model, or drop this {what}."
+
+
+def check_ellipsoids(draft: Draft) -> Iterator[str]:
+    """What MuJoCo's ellipsoid fluid model does not know."""
+    scene = draft.scene
+    if not scene.output.ellipsoid_model or not draft.sound("domain", "fluid", "flesh"):
+        return
+    wrong = [
+        *(["no fluid that acts on bodies"] if not scene.has_fluid else []),
+        *(["2 dimensions"] if scene.is_slab else []),
+        *(["[[flesh]]"] if scene.flesh else []),
+    ]
+    if scene.has_bodies and wrong:
+        yield (
+            f"{draft.at('output', 'ellipsoid_model')}: MuJoCo's model is of rigid bodies in a "
+            f"fluid in three dimensions, and the scene has {' and '.join(wrong)}. Drop this key."
+        )
 
 
 def check_bodies(draft: Draft, around: Surroundings) -> Iterator[str]:

@@ -102,13 +102,22 @@ class OutputTable(Table):
     bodies            bodies in the history: centre of mass, velocity, force and torque of the fluid
     joints            joints in the history: torque or force, power and target of their drives;
                       true for all driven joints, false for none, or names
+    ellipsoid_model   whether the history has the drag and the power that MuJoCo's ellipsoid fluid
+                      model would give for the same motion, with the stream at the start; of rigid
+                      bodies in three dimensions
     exports           files for other programs, written at the end: names, or tables with `file`
     """
 
     checkpoint_every: Count = 24
     bodies: tuple[Text, ...] = ()
     joints: SwitchOrNames = True
-    exports: tuple[Annotated[ExportTable, BeforeValidator(_named_file)], ...] = ()
+    ellipsoid_model: bool = False
+    exports: tuple[
+        Annotated[
+            ExportTable, BeforeValidator(_named_file, json_schema_input_type=str | ExportTable)
+        ],
+        ...,
+    ] = ()
 
 
 class Kept(dict[str, Any]):
@@ -296,12 +305,22 @@ class Scene(Table):
         That of the first inflow side, else of the first wind, else the fluid's initial velocity;
         None when all of it is at rest.
         """
+        winds = [
+            getattr(wind, key)
+            for key in ("velocity", "force")
+            for wind in self.wind
+            if hasattr(wind, key)
+        ]
+        return next(filter(any, [*self._inflows(), *winds, self.fluid_velocity()]), None)
+
+    def fluid_velocity(self) -> tuple[float, ...]:
+        """Velocity of the undisturbed fluid, m/s: of the first inflow side, else at the start."""
+        found = [*self._inflows(), *([] if self.fluid is None else [self.fluid.velocity])]
+        return next(filter(any, found), (0.0, 0.0, 0.0))
+
+    def _inflows(self) -> list[tuple[float, ...]]:
         sides = [] if self.boundaries is None else [side for _, side in self.boundaries]
-        found = [stream for side in sides if (stream := side.stream()) is not None]
-        for key in ("velocity", "force"):
-            found += [getattr(wind, key) for wind in self.wind if hasattr(wind, key)]
-        found += [] if self.fluid is None else [self.fluid.velocity]
-        return next((vector for vector in found if any(vector)), None)
+        return [stream for side in sides if (stream := side.stream()) is not None]
 
     def to_toml(self) -> str:
         """The scene as a file, every default written out; what is absent has no value at all."""

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from flowborne.coupling.world import Setup
 from flowborne.kernels.arrays import Array, Integers, Mask
 from flowborne.runs.history import OF_BODIES, POSE, body_columns, joint_column
 from flowborne.sim.frame import FrameReport, Snapshot
+from flowborne.solids.ellipsoids import EllipsoidModel
 from flowborne.solids.geoms import quaternion_of
 from flowborne.solids.model import HINGE, SLIDE, SolidModel
 from flowborne.solids.motors import activations_of, inputs_of, outputs_of
@@ -51,6 +52,15 @@ class Quantity:
     splits: bool = False
 
 
+class Outside(NamedTuple):
+    """Names of the joints and actuators that are told from outside, and of the bodies that are
+    pushed."""
+
+    joints: tuple[str, ...] = ()
+    actuators: tuple[str, ...] = ()
+    bodies: tuple[str, ...] = ()
+
+
 class Columns:
     """Columns of a scene's history and their values.
 
@@ -71,6 +81,8 @@ class Columns:
                                                 without the added-mass part
       added_mass_drag_N, added_mass_lift_N      with which the fluid resists the bodies'
                                                 acceleration; both together are the whole force
+      ellipsoid_drag_N, ellipsoid_power_W       force along the stream and power taken from the
+                                                bodies by MuJoCo's ellipsoid fluid model
       effort                                    |drive force| dt over the controlled dofs, N m s
       work_J                                    that the drives did in the frame
       applied_force_<body>_x_N … _z_N           sum of the forces from outside on each body on which
@@ -104,21 +116,21 @@ class Columns:
         stream: tuple[float, ...] | None = None,
         bodies: tuple[str, ...] = (),
         joints: bool | tuple[str, ...] = True,
-        told: tuple[str, ...] = (),
-        actuators: tuple[str, ...] = (),
-        pushed: tuple[str, ...] = (),
+        outside: Outside = Outside(),  # noqa: B008 (never changes)
+        ellipsoids: EllipsoidModel | None = None,
     ) -> None:
         self._controller = controller
         dofs = np.zeros(0, np.int64) if controller is None else controller.dofs
         self.controlled = controlled_positions(setup.solid, dofs)
         quantities = (
             Quantity(("frame", "time_s"), lambda now: (now.frame, now.world.time), False),
-            *of_joints(setup, dofs, joints, told),
-            *of_actuators(setup.solid, actuators),
+            *of_joints(setup, dofs, joints, outside.joints),
+            *of_actuators(setup.solid, outside.actuators),
             Quantity(sensor_columns(setup.solid), sensor_values, False),
             *of_objective(controller),
             *of_forces(stream, dofs),
-            *of_applied(setup, pushed),
+            *of_ellipsoids(ellipsoids, stream),
+            *of_applied(setup, outside.bodies),
             *of_bodies(setup.solid, bodies),
             *of_fluid(setup),
         )
@@ -298,6 +310,23 @@ def of_forces(stream: tuple[float, ...] | None, controlled: Integers) -> Iterato
     yield Quantity(names, forces, splits=True)
     yield Quantity(["effort"], effort)
     yield of_steps("work")
+
+
+def of_ellipsoids(
+    flow: EllipsoidModel | None, stream: tuple[float, ...] | None
+) -> Iterator[Quantity]:
+    """What MuJoCo's ellipsoid fluid model would give for the motion at the frame's end."""
+    if flow is None:
+        return
+    along, _ = axes_of(stream)
+
+    def values(now: Snapshot) -> list[float]:
+        if np.isnan(now.sensed.dt):
+            return [np.nan, np.nan]
+        force, power = flow.force_and_power(now.sensed.pose, now.sensed.velocity)
+        return [float(force @ along), power]
+
+    yield Quantity(["ellipsoid_drag_N", "ellipsoid_power_W"], values, False)
 
 
 def of_applied(setup: Setup, told: tuple[str, ...]) -> Iterator[Quantity]:

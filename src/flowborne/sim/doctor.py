@@ -14,7 +14,7 @@ from tempfile import TemporaryDirectory
 
 from packaging.requirements import Requirement
 
-from flowborne.base.extras import missing_to_draw
+from flowborne.base.extras import REINSTALL_MUJOCO, missing_to_draw
 from flowborne.view.space.opengl import REMEDY
 
 FOR_DEVELOPERS = ("all", "browser", "test")
@@ -92,6 +92,27 @@ def libraries() -> str:
     if lacking:
         raise ImportError(", ".join(lacking))
     return f"all {len(needed)} that a run needs"
+
+
+def mujoco_here() -> str:
+    """Version of MuJoCo, after its equations of a step have been tested.
+
+    `mujoco` and `mujoco-core` install the same folder: the files of the one installed last remain,
+    and uninstalling one breaks the other.
+    raises  OSError if both are installed at different versions
+    """
+    from flowborne.solids.engine import identity_error, mujoco
+
+    here = f"{mujoco.__version__}, whose step is off by {identity_error():.0e} of the forces"
+    try:
+        other, core = version("mujoco"), version("mujoco-core")
+    except PackageNotFoundError:
+        return here
+    folder = Path(mujoco.__file__).parent
+    shared = f"mujoco {other} and mujoco-core {core} share the folder {folder}"
+    if other != core:
+        raise OSError(f"{shared}, and the MuJoCo in it is {mujoco.__version__}")
+    return f"{here}; {shared}, so uninstall both or none"
 
 
 def kernels() -> str:
@@ -220,6 +241,7 @@ def lack(requirement: Requirement) -> str:
 CHECKS: dict[str, tuple[Callable[[], str], str, bool]] = {
     "versions": (versions_here, "install flowborne again with pip install flowborne", True),
     "libraries": (libraries, "install them with pip install flowborne", True),
+    "MuJoCo": (mujoco_here, REINSTALL_MUJOCO, True),
     "kernels": (
         kernels,
         "let NUMBA_CACHE_DIR name a folder that can be written, or install numba again",

@@ -35,10 +35,11 @@ from flowborne.kernels.arrays import Array
 from flowborne.kernels.jit import LARGE, cores, kernel_threads
 from flowborne.scenes.actuators import joints_of_actuators, scene_controls
 from flowborne.scenes.changes import ChangeTable, plain, values_at
-from flowborne.sim.columns import Columns
+from flowborne.sim.columns import Columns, Outside
 from flowborne.sim.frame import PARTS, FrameReport, Snapshot
 from flowborne.sim.trouble import trouble
 from flowborne.sim.turn import Turn
+from flowborne.solids.ellipsoids import EllipsoidModel
 from flowborne.solids.model import FREE
 from flowborne.solids.motors import activations_of, driven_by, outputs_of
 from flowborne.solids.sensed import ActuatorState, BodyState, JointState
@@ -112,20 +113,22 @@ class Simulation:
             world, self.controller = build(self.scene, self._executor)
         self.frame_time, self.step_time = self.scene.frame_time, self.scene.step_time
         self.steps_per_frame, self.frames = self.scene.time.steps_per_frame, self.scene.time.frames
-        output, stream = self.scene.output, self.scene.stream()
-        model, actuators = world.setup.solid, self.scene.told_actuators()
-        policy = self.scene.policy
+        output, model = self.scene.output, world.setup.solid
+        actuators, policy = self.scene.told_actuators(), self.scene.policy
         told, pushed = ((), ()) if policy is None else (policy.joints, policy.bodies)
         told += joints_of_actuators(model, actuators)
+        ellipsoids, fluid = None, world.setup.fluid
+        if output.ellipsoid_model and fluid is not None:
+            uniform = self.scene.fluid_velocity()
+            ellipsoids = EllipsoidModel(model, fluid.density, fluid.viscosity, uniform)
         self.columns = Columns(
             world.setup,
             self.controller,
-            stream,
+            self.scene.stream(),
             output.bodies,
             output.joints,
-            told,
-            actuators,
-            pushed,
+            Outside(told, actuators, pushed),
+            ellipsoids,
         )
         self._controls = scene_controls(self.scene.actuator, model, self.scene.constants)
         self._changes: tuple[ChangeTable, ...] = self.scene.changes

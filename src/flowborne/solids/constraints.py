@@ -12,6 +12,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from flowborne.kernels.arrays import Array, Integers
+from flowborne.solids.engine import row_jacobian
 from flowborne.solids.model import SolidModel
 from flowborne.solids.scratch import Scratch
 
@@ -99,16 +100,6 @@ def rows_of(model: SolidModel, s: Scratch) -> tuple[Rows | None, Integers]:
     )
     zones = data.efc_state.astype(np.int64)
     return merge_frictionless(*stop_in_time(rows, zones, model, s), s)
-
-
-def row_jacobian(mj: mujoco.MjModel, data: mujoco.MjData) -> Array:
-    """(k, nv) Jacobian of MuJoCo's constraint rows."""
-    if not mujoco.mj_isSparse(mj):
-        return np.array(data.efc_J).reshape(data.nefc, mj.nv)
-    J = np.zeros((data.nefc, mj.nv))
-    row = np.repeat(np.arange(data.nefc), data.efc_J_rownnz)
-    J[row, data.efc_J_colind[: len(row)]] = data.efc_J[: len(row)]
-    return J
 
 
 def stop_in_time(

@@ -15,6 +15,7 @@ from scipy.sparse import csc_array, csr_array, vstack
 
 from flowborne.kernels.arrays import Array, Integers, Mask
 from flowborne.solids.constraints import Rows, rows_of
+from flowborne.solids.engine import add_springs
 from flowborne.solids.model import SolidModel, SolidState
 from flowborne.solids.momentum import Halfway
 from flowborne.solids.scratch import Scratch, posed, scratch, twists_about_origin
@@ -319,12 +320,9 @@ def _smooth(model: SolidModel, s: Scratch, mass: Array) -> tuple[Array, Array]:
     if not data.efm_active:
         return mass, s.smooth.copy()
     A = mass.copy()
-    A.flat[:: model.nv + 1] += centred(data.efm_diag, data.efm_ck, s.dt)
-    for n, t in enumerate(data.efm_tid[: data.nefmT]):
-        first, count = s.mj.ten_J_rowadr[t], s.mj.ten_J_rownnz[t]
-        row = np.zeros(model.nv)
-        row[s.mj.ten_J_colind[first : first + count]] = data.ten_J[first : first + count]
-        A += centred(data.efm_ts[n], data.efm_tk[n], s.dt) * np.outer(row, row)
+    tendons = slice(data.nefmT)
+    strength = centred(data.efm_ts[tendons], data.efm_tk[tendons], s.dt)
+    add_springs(A, s.mj, data, centred(data.efm_diag, data.efm_ck, s.dt), strength)
     return A, s.smooth.copy()
 
 

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from flowborne.kernels.arrays import Array
-from flowborne.solids.constraints import row_jacobian
+from flowborne.solids.engine import row_jacobian
 from flowborne.solids.geoms import element_name
 from flowborne.solids.loops import active_equalities
 from flowborne.solids.model import BALL, SLIDE, SolidModel, turning_dofs

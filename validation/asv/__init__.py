@@ -1,0 +1,1 @@
+"""The benches as a suite of asv: `make bench-history`."""
