@@ -63,8 +63,8 @@ def fresh(archives: tuple[Path, Path], tmp_path_factory: pytest.TempPathFactory)
     python = environment(sys.executable, folder)
     (packages,) = folder.rglob("site-packages")
     libraries = tmp_path_factory.mktemp("libraries")
-    for here in (Path(path) for path in sys.path if path.endswith("site-packages")):
-        for found in here.iterdir():
+    for here in map(Path, sys.path):
+        for found in here.glob("*") if here.name == "site-packages" else ():
             if "flowborne" not in found.name:
                 (libraries / found.name).symlink_to(found)
     (packages / "libraries.pth").write_text(f"{libraries}\n")
