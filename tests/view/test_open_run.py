@@ -45,7 +45,7 @@ def test_its_scene_is_a_scene(opened: fb.OpenRun) -> None:
 
 def test_its_summary_is_that_of_the_file(opened: fb.OpenRun, result: fb.RunResult) -> None:
     assert opened.summary["outcome"] == "done"
-    assert opened.summary["objective_unit"] == "N"
+    assert opened.summary["objective_unit"] == "N/m"
     assert opened.summary["final_mean"] == result.summary["final_mean"]
     (result.folder / "summary.json").write_text("{")
     with pytest.raises(fb.RunFolderError, match=r"the files of run .* cannot be read"):

@@ -3,6 +3,7 @@ give."""
 
 from __future__ import annotations
 
+import json
 import operator
 import os
 from collections.abc import Callable, Mapping
@@ -159,7 +160,9 @@ def _path(value: Any) -> Any:
 
 
 def _texts(value: Any) -> dict[str, str]:
-    return {TEXT.read(key): TEXT.read(text) for key, text in PARAMETERS.read(value).items()}
+    """Dotted keys and TOML texts of their values."""
+    given = {key: _plain(one) for key, one in PARAMETERS.read(value).items()}
+    return {TEXT.read(k): v if isinstance(v, str) else json.dumps(v) for k, v in given.items()}
 
 
 def _values(value: Any) -> dict[str, Any]:
@@ -191,7 +194,7 @@ NOT_NEGATIVE = _number(lambda x: x >= 0.0, "a finite number of 0 or more")
 PART = _number(lambda x: 0.0 < x < 1.0, "a number above 0 and below 1")
 PATH = Kind(_path, "a path")
 TEXT = one_of(str, wanted="a text")
-TEXTS = Kind(_texts, "a dict of dotted keys and texts, as {'time.frames': '9'}")
+TEXTS = Kind(_texts, "a dict of dotted keys and values, as {'time.frames': 9}")
 PARAMETERS = one_of(Mapping, wanted="a dict")
 VALUES = Kind(_values, "a dict of dotted keys and values, as {'wind.0.velocity': [0.0, 5.0, 0.0]}")
 PROGRESS = such(lambda value: isinstance(value, bool) or callable(value), "a function, or True")

@@ -107,12 +107,12 @@ def scene_names() -> tuple[str, ...]:
 
 @takes(name_or_path=SCENE, overrides=or_none(TEXTS))
 def load_scene(
-    name_or_path: str | Path, overrides: Mapping[str, str] | None = None, *, trust: bool = True
+    name_or_path: str | Path, overrides: Mapping[str, Any] | None = None, *, trust: bool = True
 ) -> Scene:
     """The scene of a built-in name or of a TOML file, checked whole.
 
-    overrides  dotted key -> TOML text of its new value; list entries count from 0:
-               {"domain.resolution": "64", "control.0.strength": "30"}
+    overrides  dotted key -> its new value, or the TOML text of it; list entries count from 0:
+               {"domain.resolution": 64, "control.0.strength": 30.0}
     trust      import the Python that the scene names, as has to be done to run it; a scene that
                names some is refused without it, before any is imported; not a built-in one
     raises     SceneError with every problem there is

@@ -144,7 +144,7 @@ class _Run:
         self.taken = earlier_joints(simulation.scene)  # the run may take the earlier one's place
         self.warnings = warnings_of(simulation.scene, simulation.setup)
         scene, model = simulation.scene, simulation.setup.solid
-        self.unit = objective_unit(scene.objectives, scene.controlled_joints(), model)
+        self.unit = objective_unit(scene, model)
         self.columns = (*simulation.columns.names, *(f"seconds_{p}" for p in ("total", *PARTS)))
         self.recorder = Recorder(folder)
         self.history: History | None = None
