@@ -47,7 +47,12 @@ MAKERS = {
 """Modules whose functions give parts of pages. They are imported before autodoc imports anything:
 it does so as type checkers do, which pydantic does not bear."""
 
-MADE = re.compile(r"^<!-- made by (\w+)\.(\w+)(.*) -->$", flags=re.MULTILINE)
+NOTE = "*(`make docs` writes this part into `build/docs`.)*"
+"""What a page says below such a line where it is read as it is."""
+
+MADE = re.compile(
+    rf"^<!-- made by (\w+)\.(\w+)(.*) -->(?:\n{re.escape(NOTE)})?$", flags=re.MULTILINE
+)
 
 MARKUP = re.compile(r"(`[^`]+`)|([*|_\\])")
 """What stays as it is between backticks, and what would be markup elsewhere."""

@@ -41,7 +41,7 @@ def test_a_run_tells_what_it_found(command, small_scene, tmp_path):
     assert "5 frames are in runs/small" in out
     assert "angle_hinge_rad: 0." in out
     assert out.count("s per frame") == 1
-    assert re.search(r"objective: [\d.]+ N \(mean of the last decisions\)\n", out)
+    assert re.search(r"objective: [\d.]+ N/m \(mean of the last decisions\)\n", out)
     assert out.endswith("  look at it: flowborne view runs/small\n")
     assert "film" not in out
     assert "s/frame" not in err

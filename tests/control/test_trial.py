@@ -180,11 +180,11 @@ def test_trial_starts_from_its_pose_and_leaves_the_world_alone(
 
 
 def test_trial_in_a_flow_leaves_it_alone_and_needs_no_dye() -> None:
-    built = build(load_scene("ns-block-drag-max", {"domain.resolution": "16"}))
-    world, controller = built.world, built.controller
+    scene = load_scene("ns-block-drag-max", {"domain.resolution": "16"})
+    world, controller = build(scene)
     assert controller is not None
     for _ in range(3):
-        stepping.step(world, built.frame_time)
+        stepping.step(world, scene.frame_time)
     before = {name: values.tobytes() for name, values in world.arrays().items()}
     assert world.flow()[1].scalars["dye"].any()
     trials = controller.trials(world, stepping.step)

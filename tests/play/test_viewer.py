@@ -197,7 +197,7 @@ def test_plots_show_the_last_ten_seconds_with_goal_and_unit(viewer: PlayViewer) 
     times = curves.plots[-1].data[0]
     assert times[-1] == pytest.approx(260 / 24)
     assert times[0] == pytest.approx(times[-1] - 10.0, abs=0.05)
-    assert curves._titles[0][0] == "objective: least wind-drag (N)"
+    assert curves._titles[0][0] == "objective: least wind-drag (N/m)"
 
 
 def test_names_and_messages_are_no_html(tmp_path: Path, small_scene: Path) -> None:

@@ -52,9 +52,15 @@ def test_scene_is_sound_and_says_what_it_shows(name: str) -> None:
 
 
 @pytest.fixture(scope="module", params=NAMES)
-def built(request: pytest.FixtureRequest) -> Built:
-    """A built-in scene, built once for the tests that leave it as it is."""
-    return build(loaded(request.param))
+def scene(request: pytest.FixtureRequest) -> Scene:
+    """A built-in scene."""
+    return loaded(request.param)
+
+
+@pytest.fixture(scope="module")
+def built(scene: Scene) -> Built:
+    """It, built once for the tests that leave it as it is."""
+    return build(scene)
 
 
 def test_everything_in_the_model_has_a_name(built: Built) -> None:
@@ -89,18 +95,18 @@ walk; wings and links are thinner than two cells; held legs at their full streng
 over one."""
 
 
-def test_no_scene_warns_about_itself_and_each_says_why(built: Built) -> None:
-    assert warnings_of(built.scene, built.world.setup) == []
-    accepted = accepted_of(built.scene, built.world.setup)
-    begins = ACCEPTED.get(built.scene.name, ())
+def test_no_scene_warns_about_itself_and_each_says_why(scene: Scene, built: Built) -> None:
+    assert warnings_of(scene, built.world.setup) == []
+    accepted = accepted_of(scene, built.world.setup)
+    begins = ACCEPTED.get(scene.name, ())
     assert len(accepted) == len(begins), accepted
     for warning, begin in zip(accepted, begins, strict=True):
         assert warning.startswith(begin)
         assert len(warning.split(". Accepted: ")[1]) > 20
 
 
-def test_two_worlds_of_a_scene_are_equal_and_share_nothing(built: Built) -> None:
-    first, second = built.world.arrays(), build(built.scene).world.arrays()
+def test_two_worlds_of_a_scene_are_equal_and_share_nothing(scene: Scene, built: Built) -> None:
+    first, second = built.world.arrays(), build(scene).world.arrays()
     assert first.keys() == second.keys()
     for key, values in first.items():
         assert_array_equal(values, second[key])
@@ -117,4 +123,4 @@ def test_effort_scenes_come_to_rest_within_their_frames() -> None:
         wind = scene.wind[0].model_dump()["force"][0]
         angle = math.degrees(math.atan2(wind, weight))
         assert angle == pytest.approx({"block-effort-wind": 42.4}.get(name, 18.1), abs=0.1)
-        assert angle / scene.control[0].strength < 0.75 * made.frames * made.frame_time
+        assert angle / scene.control[0].strength < 0.75 * scene.time.frames * scene.frame_time
