@@ -45,7 +45,7 @@ def test_a_run_tells_what_it_found(command, small_scene, tmp_path):
     assert out.endswith("  look at it: flowborne view runs/small\n")
     assert "film" not in out
     assert "s/frame" not in err
-    assert re.search(r"frame 5/5  objective [\d.]+ N  hinge", err)
+    assert re.search(r"frame 5/5  objective [\d.]+ N/m  hinge", err)
     assert "hinge 47.5°" in err
 
 
