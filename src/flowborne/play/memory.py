@@ -35,7 +35,8 @@ class PlayedRun(Run):
             write_state_alone(RunFolder(path), play.simulation)
             super().__init__(path)
         scene, model = play.simulation.scene, play.simulation.setup.solid
-        self.objective_unit = objective_unit(scene, model)
+        wanted = scene.objectives, scene.controlled_joints()
+        self.objective_unit = objective_unit(*wanted, model, slab=scene.is_slab)
         self.moments = [first]
         self._bytes, self._most = first.bytes, most
         self._index(np.array([first.row["time_s"]]))

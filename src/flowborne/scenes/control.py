@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Annotated, Literal, Self
+from typing import Annotated, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -26,9 +26,6 @@ from flowborne.control.surroundings import Surroundings
 from flowborne.control.trial import Hypothesis
 from flowborne.scenes.motions import EXACT, ServoTable, out_of_plane
 from flowborne.solids.model import FREE, SLIDE, SolidModel, joint_kind
-
-if TYPE_CHECKING:
-    from flowborne.scenes.schema import Scene
 
 MOST_STEPS_PER_DECISION = 1_000_000
 """Hypothetical steps; without a fluid they take a minute, with one hours."""
@@ -198,16 +195,18 @@ UNITS = {"velocity": "m^2/s^2", "speed": "m/s", "distance": "m"} | dict.fromkeys
 """Kind of an objective -> unit of its value."""
 
 
-def objective_unit(scene: Scene, model: SolidModel) -> str:
-    """Unit of the weighted sum of the objectives; "" where they have several, or one that is not
-    known. In two dimensions forces are per metre of depth."""
-    kinds = {joint_kind(model, joint) == SLIDE for joint in scene.controlled_joints()}
+def objective_unit(
+    objectives: Sequence[AnyObjective], controlled: Sequence[str], model: SolidModel, *, slab: bool
+) -> str:
+    """Unit of the weighted sum of objectives of the controlled joints; "" where they have several,
+    or one that is not known. In a slab forces are per metre of depth."""
+    kinds = {joint_kind(model, joint) == SLIDE for joint in controlled}
     turning = {"effort": "N m s", "input-motion": "rad^2"} if kinds == {False} else {}
     sliding = {"effort": "N s", "input-motion": "m^2"} if kinds == {True} else {}
     known = UNITS | turning | sliding
-    units = {known.get(table.kind, "") for table in scene.objectives if table.weight}
+    units = {known.get(table.kind, "") for table in objectives if table.weight}
     unit = units.pop() if len(units) == 1 else ""
-    return "N/m" if scene.is_slab and unit == "N" else unit
+    return "N/m" if slab and unit == "N" else unit
 
 
 def check_control(

@@ -144,7 +144,8 @@ class _Run:
         self.taken = earlier_joints(simulation.scene)  # the run may take the earlier one's place
         self.warnings = warnings_of(simulation.scene, simulation.setup)
         scene, model = simulation.scene, simulation.setup.solid
-        self.unit = objective_unit(scene, model)
+        wanted = scene.objectives, scene.controlled_joints()
+        self.unit = objective_unit(*wanted, model, slab=scene.is_slab)
         self.columns = (*simulation.columns.names, *(f"seconds_{p}" for p in ("total", *PARTS)))
         self.recorder = Recorder(folder)
         self.history: History | None = None
