@@ -12,7 +12,7 @@ BPY_VENV := build/bpy-$(BPY)
 # Every process would compile the package anew, a fifth of what it takes to start.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: baselines bench-history bench-pages blender blender-sample browser chapters clean closeness demo dist docs exporters failing films fuzz gallery gltf-validator imports joss lint messages paper same-figures size speed strangers test validation-page workflows
+.PHONY: baselines bench-history bench-pages blender blender-sample browser chapters clean closeness demo dist docs exporters films fuzz gallery gltf-validator imports joss lint messages paper readme same-figures size speed strangers test validation-page workflows
 
 demo: $(VENV)/installed
 	$(BIN)/flowborne run ns-block-drag-max --out runs/ns-block-drag-max --replace
@@ -58,9 +58,6 @@ gltf-validator:
 imports: $(VENV)/installed-test
 	$(BIN)/python tools/imports.py
 
-failing: $(VENV)/installed-test
-	$(BIN)/python tools/failing.py
-
 films: $(VENV)/installed-test
 	$(BIN)/python tools/films.py $(NAMES)
 
@@ -75,6 +72,9 @@ joss: $(VENV)/installed-test
 
 paper: $(VENV)/installed-test
 	$(BIN)/python tools/paper.py
+
+readme: $(VENV)/installed-test
+	$(BIN)/python tools/readme.py
 
 validation-page: $(VENV)/installed-test
 	$(BIN)/python tools/validation_page.py

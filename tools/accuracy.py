@@ -7,16 +7,19 @@ from __future__ import annotations
 
 import json
 import os
+import platform
 from datetime import UTC, datetime
 from math import prod
+from pathlib import Path
 from time import process_time
 from typing import Any
 
-from failing import REPORT, ROOT
+from committed import REPORT, ROOT
 from flowborne import Simulation, __version__, load_scene
 from flowborne_validation.case import THE_RUN, entry
 from flowborne_validation.report import Data, failures, read_report, tier_of
 from markdown_text import plain, table
+from tolerances import used
 from validation_table import distance, link, number, per_cent
 
 SPEED = ROOT / "docs" / "speed.json"
@@ -73,16 +76,31 @@ def finding_of(data: Data, name: str, quantity: str) -> dict[str, Any]:
 def failing() -> str:
     """An item for each case that fails: how many of its figures do, and the one farthest off."""
     data = read_report(REPORT)
+    items = []
+    for name, found in failed_by_case(data).items():
+        worst = farthest_off(found)
+        said = f"{plain(worst['quantity'])} **{error_of(worst)}**"
+        count = f"{failed_of(data, name, found)} fail"
+        items.append(f"* {link(name)} {plain(entry(name).name)}: {said} ({count})\n")
+    return "".join(items)
+
+
+def failed_by_case(data: Data) -> dict[str, list[dict[str, Any]]]:
+    """The figures that fail, by the names of their cases."""
     by_case: dict[str, list[dict[str, Any]]] = {}
     for name, _, finding in failures(data):
         by_case.setdefault(name, []).append(finding)
-    items = []
-    for name, found in by_case.items():
-        worst = max(found, key=distance)
-        count = f"{len(found)} of {len(data[name][tier_of(data[name])]['findings'])} fail"
-        said = f"{plain(worst['quantity'])} **{error_of(worst)}**"
-        items.append(f"* {link(name)} {plain(entry(name).name)}: {said} ({count})\n")
-    return "".join(items)
+    return by_case
+
+
+def farthest_off(found: list[dict[str, Any]]) -> dict[str, Any]:
+    """The figure that is farthest from its reference, or where that is 0 from what is accepted."""
+    return max(found, key=lambda finding: (distance(finding), used(finding) or 0.0))
+
+
+def failed_of(data: Data, name: str, found: list[dict[str, Any]]) -> str:
+    """How many of the figures of a case fail."""
+    return f"{len(found)} of {len(data[name][tier_of(data[name])]['findings'])}"
 
 
 def error_of(finding: dict[str, Any]) -> str:
@@ -107,10 +125,8 @@ def speed() -> str:
         for name, one in found["scenes"].items()
     ]
     head = ("scene", "", "cells", "a frame takes")
-    return (
-        f"{table(head, rows)}\nOn one processor core, with the controller's trials, "
-        f"{found['date']}, with version `{found['version']}`."
-    )
+    where = f"On one core ({found['processor']}), with the controller's trials"
+    return f"{table(head, rows)}\n{where}, {found['date']}, with version `{found['version']}`."
 
 
 def measure(name: str) -> dict[str, float]:
@@ -128,6 +144,18 @@ def measure(name: str) -> dict[str, float]:
     return {"cells": cells, "frames_per_second": rate, "seconds": float(f"{seconds:.3g}")}
 
 
+def processor() -> str:
+    """Name, family and model of the processor, as far as the system gives them."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return platform.processor() or platform.machine()
+    told = {key.strip(): value.strip() for key, _, value in (one.partition(":") for one in lines)}
+    keys = (("model name", ""), ("cpu family", "family "), ("model", "model "))
+    parts = [before + told[key] for key, before in keys if key in told]
+    return ", ".join(parts) or platform.machine()
+
+
 def write() -> None:
     """Measure SCENES on one core.
 
@@ -138,6 +166,7 @@ def write() -> None:
     found = {
         "date": datetime.now(UTC).date().isoformat(),
         "version": __version__,
+        "processor": processor(),
         "scenes": {name: measure(name) for name in SCENES},
     }
     SPEED.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")

@@ -6,7 +6,7 @@ from typing import Any
 
 import yaml  # type: ignore[import-untyped]
 
-from failing import ROOT
+from committed import ROOT
 
 
 def bibtex() -> str:

@@ -10,7 +10,7 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
-from failing import REPORT, ROOT
+from committed import REPORT, ROOT
 from flowborne_validation.report import Data, read_report, tier_of, verdicts
 from marked import with_part
 

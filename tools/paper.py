@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from failing import REPORT, ROOT
-from failing import number as shown
+from committed import REPORT, ROOT
+from committed import number as shown
 from flowborne_validation.case import reference
 from flowborne_validation.report import Data, grid_of, read_report, tier_of
 from markdown_text import plain, table

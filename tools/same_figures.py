@@ -11,7 +11,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from failing import REPORT
+from committed import REPORT
 from flowborne_validation.case import Tier
 from flowborne_validation.report import Data, read_report
 

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any, NamedTuple
 
-from failing import REPORT
+from committed import REPORT
 from flowborne_validation.page import curves_of, drag_over_reynolds, plots_of
 from flowborne_validation.report import Data, read_report, tier_of
 from tolerances import dots

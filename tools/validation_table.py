@@ -7,8 +7,8 @@ import subprocess
 from collections import Counter
 from typing import Any
 
-from failing import REPORT, ROOT
-from failing import number as shown
+from committed import REPORT, ROOT
+from committed import number as shown
 from flowborne.base.version import __version__
 from flowborne_validation.case import entry
 from flowborne_validation.report import (

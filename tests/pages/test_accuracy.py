@@ -8,7 +8,7 @@ import pytest
 
 import accuracy
 import tolerances
-from failing import REPORT, ROOT
+from committed import REPORT, ROOT
 from flowborne.scenes.load import scene_names
 from flowborne_validation.report import failures, read_report, tier_of
 

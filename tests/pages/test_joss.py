@@ -7,7 +7,7 @@ from pathlib import Path
 
 import yaml
 
-from failing import REPORT, ROOT
+from committed import REPORT, ROOT
 from flowborne_validation.report import read_report
 from joss import PAPER, counts, errors
 from marked import with_part

@@ -33,6 +33,16 @@ def test_its_pictures_are_there_and_small() -> None:
     assert all((README.parent / path).stat().st_size < 600_000 for path in shown)
 
 
+def test_its_python_needs_no_scene_file(capsys: pytest.CaptureFixture[str]) -> None:
+    """The ball falls slower than in vacuum, and than in endless water, of which it moves half its
+    volume: the box is six radii wide."""
+    (script,) = (block.text for block in blocks_of(README) if block.language == "python")
+    assert len([line for line in script.splitlines() if line]) == 6
+    exec(compile(script, "README.md", "exec"), {})
+    endless = 0.5 * 9.81 * (2000 - 1000) / (2000 + 500) * 0.1**2
+    assert 0.85 * endless < -float(capsys.readouterr().out) < endless
+
+
 def test_every_line_is_a_command_of_flowborne_or_a_target_of_make() -> None:
     others = [words for words in COMMANDS if words[0] != ".venv/bin/flowborne"]
     assert len(OWN) > 4

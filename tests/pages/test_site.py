@@ -94,6 +94,15 @@ def tables_below(model: type[BaseModel]) -> set[type[BaseModel]]:
     return {model}.union(*(tables_below(one) for one in inner))
 
 
+def test_reports_stand_in_an_appendix(site: Path) -> None:
+    text = (site / "index.html").read_text(encoding="utf-8")
+    handbook, appendix = text.split(">Appendix</span>")
+    for page in ("attack", "strangers", "learning"):
+        entry = f'class="reference internal" href="{page}.html"'
+        assert entry in appendix
+        assert entry not in handbook
+
+
 def test_every_key_of_a_scene_is_there_with_its_meaning(site: Path) -> None:
     text = (site / "scene-keys.html").read_text(encoding="utf-8")
     found = tables_below(Scene)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import validation_page
-from failing import README, REPORT, with_section
+from committed import REPORT
 from flowborne_validation.report import read_report
+from readme import README, with_section
 
 
 def test_the_readme_names_what_fails_in_the_committed_report() -> None:
     text = README.read_text(encoding="utf-8")
-    assert text == with_section(text), "README.md is out of date: run `make failing`"
+    assert text == with_section(text), "README.md is out of date: run `make readme`"
 
 
 def test_the_plots_are_those_of_the_committed_report() -> None:
