@@ -24,6 +24,7 @@ import accuracy
 import api_pages
 import citation
 import command_help
+import notebooks
 import parts
 import scene_keys
 import symbols
@@ -38,6 +39,7 @@ MAKERS = {
         api_pages,
         citation,
         command_help,
+        notebooks,
         parts,
         scene_keys,
         symbols,
