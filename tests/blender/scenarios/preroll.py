@@ -5,8 +5,8 @@ import time
 
 import numpy as np
 from blender.character import reaction_of
-from blender.job import ACTIVE, State
-from blender.panel import start_job
+from blender.jobs import start_job
+from blender.process import IDLE, State
 from blender.reaction import ReactionError
 
 from stage import (
@@ -34,7 +34,7 @@ job = start_job(bpy.context, os.environ["FLOWBORNE_ENGINE"])
 assert (scene.frame_start, scene.frame_end) == (11, 16)
 assert (job.reaction.first, job.reaction.lead, job.reaction.frames) == (11, 8, 13)
 until = time.monotonic() + 300.0
-while job.step() in ACTIVE:
+while job.step() not in IDLE:
     time.sleep(0.02)
     assert time.monotonic() < until
 assert job.state is State.DONE, job.message

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import json
 import math
+import os
+import subprocess
 import sys
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -40,6 +42,24 @@ def new_scene(first: int = 1, last: int = 12) -> Any:
     scene.frame_start, scene.frame_end = first, last
     bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "shot.blend"))
     return scene
+
+
+def install_extension() -> str:
+    """Build the extension, install it as a user does, and return the name of its module."""
+    (builder,) = Path(bpy.utils.system_resource("SCRIPTS")).rglob("blender_ext.py")
+    source, archive = Path(blender.__file__).parent, FOLDER / "flowborne.zip"
+    for command in (
+        ("build", "--source-dir", source, "--output-filepath", archive),
+        ("validate", archive),
+    ):
+        subprocess.run([sys.executable, builder, *command], check=True)
+    assert Path(bpy.utils.user_resource("EXTENSIONS")).is_relative_to(
+        os.environ["BLENDER_USER_RESOURCES"]
+    )
+    bpy.ops.extensions.package_install_files(
+        filepath=str(archive), repo="user_default", enable_on_install=True
+    )
+    return "bl_ext.user_default.flowborne"
 
 
 def character(name: str = "rig", modes: Sequence[str] = ("QUATERNION",) * 3) -> Any:
