@@ -8,6 +8,8 @@ reaction     the settings of a run, and the scene file made of them
 presets      bones by their names
 motion       what a run gives, and the rotation of bones in it
 settings     what the user sets for an armature
+keys         actions and their keys
+stand_in     a copy of a character with its deforming bones alone
 character    armature, meshes and settings from a Blender scene
 bake         a run as an action on the NLA
 jobs         the jobs of this session, and those next to the .blend

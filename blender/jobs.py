@@ -36,8 +36,8 @@ def start_job(context: Any, engine: str, only_check: bool = False) -> Job:
         raise ReactionError("the run is written next to the .blend file: save it first")
     numbers = folders_of(armature)
     job = Job(command, folder_of(armature, max(numbers, default=0) + 1), reaction)
-    earlier = 0 if reaction.loop else reaction.lead
-    export_character(context, armature, job.folder / CHARACTER, earlier)
+    first = reaction.first - (0 if reaction.loop else reaction.lead)
+    export_character(context, armature, job.folder / CHARACTER, first, context.scene.frame_end)
     job.start(only_check)
     settings.folder = relative(job.folder)
     JOBS[str(job.folder)] = job

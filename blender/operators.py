@@ -11,8 +11,8 @@ from typing import Any
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
-from .bake import bake
-from .character import armature_of
+from .bake import bake, turned_away
+from .character import armature_of, control_of, selected_bones
 from .environment import Install, engine_command
 from .job import Job
 from .jobs import (
@@ -150,16 +150,22 @@ class FlowborneBake(bpy.types.Operator):
             reaction = job.reaction
             motion = read_motion(job.run).after(reaction.lead, reaction.loop)
             chosen = {
-                "FREE": [*motion.moving[: reaction.floats], *reaction.bones],
-                "SELECTED": [bone.name for bone in armature.pose.bones if bone.select],
-                "ALL": motion.moving,
-            }[self.bones]
-            place, thin = (reaction.first, reaction.unit), math.degrees(self.thin)
-            strip = bake(context, armature, motion, *place, chosen, thin)
+                "FREE": lambda: [*motion.moving[: reaction.floats], *reaction.bones],
+                "SELECTED": lambda: [bone.name for bone in selected_bones(armature)],
+                "ALL": lambda: motion.moving,
+            }[self.bones]()
+            thin = math.degrees(self.thin)
+            strip = bake(context, armature, motion, reaction.first, reaction.unit, chosen, thin)
             done = f"baked {len(chosen)} bones to '{strip.name}'"
             if reaction.loop and job.frames_done >= reaction.frames:
                 done += f"; the ends of the loop are {motion.ends_apart(chosen):.2g}° apart"
-            self.report({"INFO"}, done)
+            away = turned_away(context, armature, motion, reaction.first, chosen)
+            if away and not thin:
+                turned = ", ".join(f"{name} by {angle:.2g}°" for name, angle in away.items())
+                done += (
+                    f"; constraints or drivers turn bones away from the run: {turned}. Mute them"
+                )
+            self.report({"WARNING" if away and not thin else "INFO"}, done)
             return {"FINISHED"}
         return {"CANCELLED"}
 
@@ -188,7 +194,7 @@ class FlowbornePreset(bpy.types.Operator):
                     f"no deforming bone below the root of '{armature.name}' has one of these words "
                     f"in its name: {', '.join(PRESETS[self.kind])}. Select bones in Pose Mode"
                 )
-            _select(armature, found)
+            _select(armature, [control_of(armature.pose.bones[name]).name for name in found])
             self.report({"INFO"}, f"selected {', '.join(found)}")
             return {"FINISHED"}
         return {"CANCELLED"}

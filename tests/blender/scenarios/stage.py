@@ -62,8 +62,11 @@ def install_extension() -> str:
     return "bl_ext.user_default.flowborne"
 
 
-def character(name: str = "rig", modes: Sequence[str] = ("QUATERNION",) * 3) -> Any:
-    """An armature of three bones with a box bound to it, and an action that moves all bones."""
+def character(
+    name: str = "rig", modes: Sequence[str] = ("QUATERNION",) * 3, first: int | None = None
+) -> Any:
+    """An armature of three bones with a box bound to it, and an action that moves all bones, from
+    the first frame of the scene or another one."""
     scene = bpy.context.scene
     armature = bpy.data.objects.new(name, bpy.data.armatures.new(name))
     scene.collection.objects.link(armature)
@@ -78,9 +81,10 @@ def character(name: str = "rig", modes: Sequence[str] = ("QUATERNION",) * 3) -> 
         edited.parent, parent = parent, edited
     bpy.ops.object.mode_set(mode="OBJECT")
     bind(armature)
+    first = scene.frame_start if first is None else first
     for bone, mode in zip(armature.pose.bones, modes, strict=True):
         bone.rotation_mode = mode
-    for frame in range(scene.frame_start, scene.frame_end + 1):
+    for frame in range(first, scene.frame_end + 1):
         for number, bone in enumerate(armature.pose.bones):
             turn = Euler((0.2 * math.sin(0.5 * frame + number), 0.1 * number, 0.05 * frame))
             set_rotation(bone, turn.to_quaternion())
@@ -90,8 +94,8 @@ def character(name: str = "rig", modes: Sequence[str] = ("QUATERNION",) * 3) -> 
     return armature
 
 
-def bind(armature: Any) -> None:
-    """Bind a closed box around the bones to an armature."""
+def bind(armature: Any, bones: Sequence[str] = BONES) -> None:
+    """Bind a closed box around three bones, which are at JOINTS, to an armature."""
     rings = np.linspace(JOINTS[0], JOINTS[-1], 21)
     corners = [(-0.15, 0.9), (0.15, 0.9), (0.15, 1.1), (-0.15, 1.1)]
     points = [(x, y, z) for y in rings for x, z in corners]
@@ -105,7 +109,7 @@ def bind(armature: Any) -> None:
     body = bpy.data.objects.new(f"{armature.name} body", mesh)
     bpy.context.scene.collection.objects.link(body)
     body.parent = armature
-    for number, bone in enumerate(BONES):
+    for number, bone in enumerate(bones):
         group = body.vertex_groups.new(name=bone)
         low, high = JOINTS[number] if number else -1.0, JOINTS[number + 1] if number < 2 else 9.0
         for vertex, (_, y, _) in enumerate(points):
