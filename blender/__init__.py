@@ -1,15 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Blender extension: bones of a character react to wind or water, computed by flowborne.
 
-job        a run of flowborne as a child process; files are exchanged, nothing else
-reaction   the settings of a run, and the scene file made of them
-presets    bones by their names
-motion     what a run gives, and the rotation of bones in it
-character  armature, meshes and settings from a Blender scene
-bake       a run as an action on the NLA
-panel      properties, operators and the panel
+process      child processes, one after the other
+environment  the Python environment of flowborne, found or made
+job          a run of flowborne; files are exchanged, nothing else
+reaction     the settings of a run, and the scene file made of them
+presets      bones by their names
+motion       what a run gives, and the rotation of bones in it
+settings     what the user sets for an armature
+keys         actions and their keys
+stand_in     a copy of a character with its deforming bones alone
+character    armature, meshes and settings from a Blender scene
+bake         a run as an action on the NLA
+jobs         the jobs of this session, and those next to the .blend
+operators    what the buttons do
+panel        the panel, and the preferences
 
-`job`, `reaction`, `presets` and `motion` do not import Blender.
+The first six do not import Blender.
 """
 
 

@@ -3,26 +3,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Any
 
-import bpy
 import numpy as np
 from mathutils import Euler, Matrix
 
-from .character import TRACK, check_armature
-from .motion import (
-    Array,
-    Motion,
-    MotionError,
-    axes_only,
-    basis,
-    keys_within,
-    same_side,
-    shift,
-    turns,
-)
+from .character import TRACK, check_armature, control_of, end_of, in_frames, poses_of
+from .keys import add_keys, new_action
+from .motion import Array, Motion, MotionError, angles, axes_only, keys_within, same_side, turns
+
+NOTICED = 0.1
+"""Degrees from the run above which a bone is reported."""
 
 
 def bake(
@@ -36,9 +29,10 @@ def bake(
 ) -> Any:
     """Put the motion of bones on the NLA of an armature, and return the strip.
 
-    Each bone gets rotations in its own rotation mode, and a location if it has no parent, so that
-    its axes in the world are those of the run in every frame. The active action is moved to a strip
-    below, where it plays as before; its keys do not change.
+    Each bone, or the control whose place it copies, gets rotations in its own rotation mode, and a
+    location if its parent is no bone of the run, so that its axes in the world are those of the run
+    in every frame. The active action is moved to a strip below, where it plays as before; its keys
+    do not change.
 
     first      frame of Blender at which the motion starts
     unit       m per unit of Blender
@@ -57,68 +51,72 @@ def bake(
     data = armature.animation_data or armature.animation_data_create()
     if data.use_tweak_mode:
         raise MotionError("a strip of the NLA is in Tweak Mode: leave it (Tab in the NLA editor)")
-    frames = first + np.arange(len(motion.position), dtype=np.float64)
-    before = _Before(context, armature, frames, bones)
-    action = bpy.data.actions.new(f"{TRACK} {armature.name}")
-    slot = action.slots.new(id_type="OBJECT", name=armature.name)
-    layer = action.layers.new("Layer")
-    bag = layer.strips.new(type="KEYFRAME").channelbag(slot, ensure=True)
-    for name in bones:
-        bone = armature.pose.bones[name]
-        above, rest_above = before.above(bone, motion, bones)
-        rest = np.array(bone.bone.matrix_local)
-        position, rotation = motion.of(name)
-        turned = basis(rotation, above, axes_only(rest), rest_above)
-        path, values = _rotations(bone.rotation_mode, turned, before.started[name])
+    pose, frames = armature.pose.bones, range(first, first + len(motion.position))
+    controls = {control_of(pose[name]).name: name for name in bones}
+    ends = {end: name for name in bones if (end := end_of(pose[name])) and end not in controls}
+    controls |= ends
+    needed = {each.name for name in controls for each in [pose[name], *pose[name].parent_recursive]}
+    places, before = poses_of(context, armature, frames, needed)
+    for _ in in_frames(context, frames[:1]):
+        started = {name: _rotation_of(pose[name]) for name in controls}
+    after = {control: motion.in_armature(name, unit, places) for control, name in controls.items()}
+    for end, name in ends.items():
+        after[end][:, :3, 3] += after[end][:, :3, 1] * pose[name].bone.length
+    action, slot, bag = new_action(f"{TRACK} {armature.name}", armature.name)
+    for name in controls:
+        bone, above = pose[name], None
+        if bone.parent is not None:
+            above = before[bone.parent.name]
+            carrier = next((b.name for b in bone.parent_recursive if b.name in controls), None)
+            if carrier is not None:
+                above = after[carrier] @ np.linalg.inv(before[carrier]) @ above
+        local = [*_locals(bone, after[name], above)]
+        path, values = _rotations(bone.rotation_mode, local, started[name])
         kept = [*range(len(frames))]
         if tolerance > 0.0:
             kept = keys_within(values, partial(_quaternions, bone.rotation_mode), tolerance)
-        _add_curves(bag, bone, path, frames[kept], values[kept])
-        if bone.parent is None:
-            location = shift(position / unit, before.places, axes_only(rest), rest[:3, 3])
-            _add_curves(bag, bone, "location", frames, location)
-    _push_down(data, int(frames[0]), int(frames[-1]))
+        add_keys(bag, bone, path, [frames[k] for k in kept], values[kept])
+        if bone.parent is None or bone.parent.name not in motion.names:
+            add_keys(bag, bone, "location", frames, np.array([each.translation for each in local]))
+    _push_down(data, frames[0], frames[-1])
     track = data.nla_tracks.new()
     track.name = action.name
-    strip = _add_strip(track, action, slot, float(frames[0]), float(frames[-1]))
+    strip = _add_strip(track, action, slot, frames[0], frames[-1])
     strip.extrapolation = "NOTHING"
     data.use_nla = True
     return strip
 
 
-class _Before:
-    """The armature as it is animated before the bake.
+def turned_away(
+    context: Any, armature: Any, motion: Motion, first: int, bones: Sequence[str]
+) -> dict[str, float]:
+    """Bones that constraints or drivers turn away from the run after a bake -> degrees.
 
-    places   (frames, 4, 4) its axes to the world's
-    started  bone -> its rotation in its rotation mode, in the first frame
+    The first, middle and last frame are examined.
     """
+    last = len(motion.position) - 1
+    chosen = [0, last // 2, last]
+    places, poses = poses_of(context, armature, [first + frame for frame in chosen], bones)
+    apart = {
+        name: angles(axes_only(places @ poses[name]), motion.of(name)[1][chosen]).max()
+        for name in bones
+    }
+    return {name: float(angle) for name, angle in apart.items() if angle > NOTICED}
 
-    def __init__(self, context: Any, armature: Any, frames: Array, bones: Sequence[str]) -> None:
-        pose, scene = armature.pose.bones, context.scene
-        parents = {pose[name].parent for name in bones} - {None}
-        self._parents: dict[str, list[Array]] = {
-            bone.name: [] for bone in parents if bone.name not in bones
-        }
-        places, current = [], scene.frame_current
-        for frame in frames.tolist():
-            scene.frame_set(int(frame))
-            places.append(np.array(armature.matrix_world))
-            for name, found in self._parents.items():
-                found.append(np.array(armature.matrix_world @ pose[name].matrix))
-            if frame == frames[0]:
-                self.started = {name: _rotation_of(pose[name]) for name in bones}
-        scene.frame_set(current)
-        self.places = np.array(places)
 
-    def above(self, bone: Any, motion: Motion, bones: Sequence[str]) -> tuple[Array, Array]:
-        """Axes of a bone's parent to the world's (frames, 3, 3), and to the armature's at rest."""
-        parent = bone.parent
-        if parent is None or not bone.bone.use_inherit_rotation:
-            return axes_only(self.places), np.eye(3)
-        rest = axes_only(np.array(parent.bone.matrix_local))
-        if parent.name in bones:
-            return motion.of(parent.name)[1], rest
-        return axes_only(np.array(self._parents[parent.name])), rest
+def _locals(bone: Any, poses: Array, above: Array | None) -> Iterator[Any]:
+    """Matrices of a pose bone relative to its rest pose.
+
+    poses  (frames, 4, 4) its axes to the armature's
+    above  (frames, 4, 4) those of its parent; None without one
+    """
+    rest = bone.bone.matrix_local
+    for number, pose in enumerate(poses):
+        parent = {}
+        if above is not None:
+            parent["parent_matrix"] = Matrix(above[number])
+            parent["parent_matrix_local"] = bone.parent.bone.matrix_local
+        yield bone.bone.convert_local_to_pose(Matrix(pose), rest, **parent, invert=True)
 
 
 def _rotation_of(bone: Any) -> Any:
@@ -129,13 +127,11 @@ def _rotation_of(bone: Any) -> Any:
     return (bone.rotation_quaternion if quaternion else bone.rotation_euler).copy()
 
 
-def _rotations(mode: str, turned: Array, start: Any) -> tuple[str, Array]:
+def _rotations(mode: str, matrices: Sequence[Any], start: Any) -> tuple[str, Array]:
     """Property of a rotation mode, and its values (frames, 3 or 4), without flips.
 
-    turned  (frames, 3, 3)
-    start   rotation before the first frame, to which the values are near
+    start  rotation before the first frame, to which the values are near
     """
-    matrices = [Matrix(matrix.tolist()) for matrix in turned]
     if mode in ("QUATERNION", "AXIS_ANGLE"):
         quaternions = np.array([matrix.to_quaternion() for matrix in matrices])
         if mode == "AXIS_ANGLE":
@@ -160,17 +156,6 @@ def _quaternions(mode: str, values: Array) -> Array:
     else:
         found = np.array([Euler(each, mode).to_quaternion() for each in values.tolist()])
     return np.asarray(found / np.linalg.norm(found, axis=1, keepdims=True))
-
-
-def _add_curves(bag: Any, bone: Any, path: str, frames: Array, values: Array) -> None:
-    """Keys of a property of a bone: a curve for each column of values (frames, k)."""
-    for index, column in enumerate(values.T):
-        curve = bag.fcurves.new(bone.path_from_id(path), index=index, group_name=bone.name)
-        curve.keyframe_points.add(len(frames))
-        curve.keyframe_points.foreach_set("co", np.column_stack([frames, column]).ravel())
-        for point in curve.keyframe_points:
-            point.interpolation = "LINEAR"
-        curve.update()
 
 
 def _push_down(data: Any, first: int, last: int) -> None:

@@ -4,15 +4,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from statistics import mode
 from typing import Any
 
 import bpy
 import numpy as np
 
+from .motion import Array
 from .reaction import Reaction, ReactionError, Vector
+from .stand_in import parents_of, play, remove, stand_in
 
 TRACK = "flowborne"
 """Start of the names of our NLA tracks."""
@@ -131,8 +134,9 @@ def reaction_of(context: Any, armature: Any, settings: Any) -> Reaction:
     """
     check_armature(armature)
     scene, unit = context.scene, context.scene.unit_settings.scale_length
-    free = [bone for bone in armature.pose.bones if bone.select]
-    cones = {bone.name: cone for bone in free if (cone := cone_of(bone)) is not None}
+    free = selected_bones(armature)
+    _check_carried(armature, free)
+    cones = {bone.name: cone for bone in free if (cone := cone_of(control_of(bone))) is not None}
     length = scene.frame_end - scene.frame_start
     rounds = settings.rounds
     gravity = [unit * g for g in scene.gravity] if scene.use_gravity else (0.0, 0.0, 0.0)
@@ -158,10 +162,105 @@ def reaction_of(context: Any, armature: Any, settings: Any) -> Reaction:
     )
 
 
-def export_character(context: Any, armature: Any, path: Path, earlier: int = 0) -> None:
-    """Write armature, meshes and animation of the scene's frame range as a .glb file.
+def control_of(bone: Any) -> Any:
+    """The pose bone whose place a pose bone copies: a control of its rig, or the bone itself."""
+    return _chain(bone)[-1]
 
-    The animation starts `earlier` frames before the range.
+
+def end_of(bone: Any) -> str:
+    """Name of the pose bone to which a pose bone, or one whose place it copies, is stretched."""
+    return next(
+        (
+            limit.subtarget
+            for each in _chain(bone)
+            for limit in each.constraints
+            if limit.type == "STRETCH_TO" and _is_full(limit)
+        ),
+        "",
+    )
+
+
+def _chain(bone: Any) -> list[Any]:
+    """A pose bone, the one whose place it copies, the one whose place that copies, and so on."""
+    found = []
+    while bone is not None and bone not in found:
+        found.append(bone)
+        copies = (
+            limit.subtarget
+            for limit in bone.constraints
+            if limit.type == "COPY_TRANSFORMS"
+            and _is_full(limit)
+            and {limit.owner_space, limit.target_space} <= {"WORLD", "POSE"}
+        )
+        bone = bone.id_data.pose.bones.get(next(copies, ""))
+    return found
+
+
+def _is_full(constraint: Any) -> bool:
+    """Whether a constraint to the same armature acts in full."""
+    full = constraint.influence == 1.0 and not constraint.mute
+    return full and constraint.target == constraint.id_data
+
+
+def selected_bones(armature: Any) -> list[Any]:
+    """Deforming pose bones that are selected, or whose control is.
+
+    raises  ReactionError for other bones in the selection
+    """
+    controls = {bone: control_of(bone) for bone in armature.pose.bones if bone.bone.use_deform}
+    for bone in armature.pose.bones:
+        if bone.select and bone not in controls and bone not in controls.values():
+            raise ReactionError(
+                f"bone '{bone.name}' deforms nothing, and no deforming bone copies its place: "
+                "select others (in Rigify those of the collection 'Tweak' or 'DEF')"
+            )
+    return [bone for bone, control in controls.items() if bone.select or control.select]
+
+
+def in_frames(context: Any, frames: Iterable[int]) -> Iterator[int]:
+    """Set the scene to each of these frames, and at last to the present one again."""
+    scene = context.scene
+    current = scene.frame_current, scene.frame_subframe
+    try:
+        for frame in frames:
+            scene.frame_set(frame)
+            yield frame
+    finally:
+        scene.frame_set(current[0], subframe=current[1])
+
+
+def _check_carried(armature: Any, bones: Iterable[Any]) -> None:
+    """Raise ReactionError for bones that hang on a control bone apart from the body."""
+    bodies = parents_of(armature.data.bones)
+    roots = {name: name for name in bodies}
+    while any(bodies[root] for root in roots.values()):
+        roots = {name: bodies[root] or root for name, root in roots.items()}
+    main = mode(roots.values()) if roots else ""
+    for bone in bones:
+        root = roots[bone.name]
+        if root != main and not armature.data.bones[root].use_deform:
+            raise ReactionError(
+                f"bone '{bone.name}' hangs on control '{root}' instead of a deforming bone, as "
+                "tails of Rigify's type spines.basic_tail do: use limbs.simple_tentacle for this "
+                "chain, and generate the rig again"
+            )
+
+
+def poses_of(
+    context: Any, armature: Any, frames: Iterable[int], bones: Iterable[str]
+) -> tuple[Array, dict[str, Array]]:
+    """(frames, 4, 4) axes of an armature to the world's, and of bones to the armature's."""
+    places: list[Array] = []
+    found: dict[str, list[Array]] = {name: [] for name in bones}
+    for _ in in_frames(context, frames):
+        places.append(np.array(armature.matrix_world))
+        for name, poses in found.items():
+            poses.append(np.array(armature.pose.bones[name].matrix))
+    return np.array(places), {name: np.array(poses) for name, poses in found.items()}
+
+
+def export_character(context: Any, armature: Any, path: Path, first: int, last: int) -> None:
+    """Write armature, meshes and animation of frames of Blender as a .glb file.
 
     Modifiers other than the armature's are applied. Selection, mode and frame stay as they are.
     raises  ReactionError when the armature is hidden, or no mesh is visible
@@ -170,58 +269,50 @@ def export_character(context: Any, armature: Any, path: Path, earlier: int = 0) 
         raise ReactionError(f"armature '{armature.name}' is hidden: show it for the export")
     meshes = meshes_of(context, armature)
     path.parent.mkdir(parents=True, exist_ok=True)
-    with _ready(context, armature, meshes, earlier):
-        bpy.ops.export_scene.gltf(
-            filepath=str(path),
-            export_format="GLB",
-            use_selection=True,
-            export_apply=True,
-            export_animation_mode="SCENE",
-            export_anim_scene_split_object=False,
-            export_frame_range=True,
-            export_force_sampling=True,
-            export_optimize_animation_size=False,
-            export_rest_position_armature=True,
-            export_all_influences=True,
-            export_morph=False,
-            export_materials="NONE",
-            export_normals=False,
-            export_texcoords=False,
-            export_cameras=False,
-            export_lights=False,
-        )
+    frames, bones = range(first, last + 1), parents_of(armature.data.bones)
+    with _without_bakes(armature):
+        places, poses = poses_of(context, armature, frames, bones)
+    scene, render = bpy.data.scenes.new(TRACK), context.scene.render
+    try:
+        copy = stand_in(context, scene, armature, meshes, armature.name)
+        play(copy, range(len(frames)), {name: places @ pose for name, pose in poses.items()})
+        scene.frame_start, scene.frame_end = 0, last - first
+        # Times of the file are in seconds, but the exporter multiplies by the base of the rate.
+        scene.render.fps, scene.render.fps_base = render.fps, 1.0 / render.fps_base
+        with context.temp_override(scene=scene, view_layer=scene.view_layers[0]):
+            bpy.ops.export_scene.gltf(
+                filepath=str(path),
+                export_format="GLB",
+                use_active_scene=True,
+                export_apply=True,
+                export_animation_mode="SCENE",
+                export_anim_scene_split_object=False,
+                export_frame_range=True,
+                export_force_sampling=True,
+                export_optimize_animation_size=False,
+                export_rest_position_armature=True,
+                export_all_influences=True,
+                export_morph=False,
+                export_materials="NONE",
+                export_normals=False,
+                export_texcoords=False,
+                export_cameras=False,
+                export_lights=False,
+            )
+    finally:
+        remove(scene.objects)
+        bpy.data.scenes.remove(scene)
 
 
 @contextmanager
-def _ready(context: Any, armature: Any, meshes: list[Any], earlier: int) -> Iterator[None]:
-    """Context in which the character alone is selected, its earlier bakes are muted, and the frame
-    range starts earlier.
-
-    Times of a glTF file are in seconds. Blender's exporter multiplies the rate by `fps_base`, by
-    which it has to be divided, so that the context holds its inverse.
-    """
-    scene, objects = context.scene, context.view_layer.objects
-    active, mode, frame = objects.active, armature.mode, scene.frame_current
-    selected, base = [thing for thing in objects if thing.select_get()], scene.render.fps_base
+def _without_bakes(armature: Any) -> Iterator[None]:
+    """Context in which the earlier bakes of an armature are muted."""
     tracks = armature.animation_data.nla_tracks if armature.animation_data else ()
     bakes = [track for track in tracks if track.name.startswith(TRACK) and not track.mute]
-    objects.active = armature
-    bpy.ops.object.mode_set(mode="OBJECT")
     try:
-        for thing in objects:
-            thing.select_set(thing == armature or thing in meshes)
         for track in bakes:
             track.mute = True
-        scene.render.fps_base = 1.0 / base
-        scene.frame_start -= earlier
         yield
     finally:
-        scene.render.fps_base = base
-        scene.frame_start += earlier
         for track in bakes:
             track.mute = False
-        for thing in objects:
-            thing.select_set(thing in selected)
-        bpy.ops.object.mode_set(mode=mode)
-        objects.active = active
-        scene.frame_set(frame)

@@ -43,6 +43,18 @@ class Motion:
         number = self.names.index(bone)
         return self.position[:, number], self.rotation[:, number]
 
+    def in_armature(self, bone: str, unit: float, places: Array) -> Array:
+        """(frames, 4, 4) axes and head of a bone, without scale, in the axes of its armature.
+
+        unit    m per unit of Blender
+        places  (frames, 4, 4) the armature's axes to the world's, with uniform scale
+        """
+        position, rotation = self.of(bone)
+        world = np.tile(np.eye(4), (len(position), 1, 1))
+        world[:, :3, :3] = rotation * np.linalg.norm(places[:, :3, :1], axis=1, keepdims=True)
+        world[:, :3, 3] = position / unit
+        return np.asarray(np.linalg.inv(places) @ world)
+
     def check(self, bones: Iterable[str]) -> None:
         """Raise MotionError for a bone that the run does not move."""
         for bone in bones:
@@ -72,12 +84,8 @@ class Motion:
     def ends_apart(self, bones: Iterable[str]) -> float:
         """Largest rotation of bones, relative to the root, from first to last frame, degrees."""
         root = np.swapaxes(self.of(self.moving[0])[1], 1, 2)
-        found = [0.0]
-        for bone in bones:
-            first, *_, last = root @ self.of(bone)[1]
-            cosine = (np.trace(first.T @ last) - 1.0) / 2.0
-            found.append(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
-        return float(max(found))
+        ends = [(root @ self.of(bone)[1])[[0, -1]] for bone in bones]
+        return max((float(angles(*pair)) for pair in ends), default=0.0)
 
 
 def read_motion(run: Path) -> Motion:
@@ -101,27 +109,10 @@ def _read(path: Path) -> tuple[Array, Array]:
         return state["body_position"], state["body_rotation"]
 
 
-def basis(world: Array, above: Array, rest: Array, rest_above: Array) -> Array:
-    """(frames, 3, 3) rotation of a pose bone relative to its rest pose, in its own axes.
-
-    world       (frames, 3, 3) bone's axes to the world's
-    above       (frames, 3, 3) those of its parent, or of the armature for a bone without one
-    rest        (3, 3) bone's axes to the armature's, in the rest pose
-    rest_above  (3, 3) those of its parent, the identity without one
-    """
-    return np.swapaxes(above @ (rest_above.T @ rest), -1, -2) @ world
-
-
-def shift(position: Array, places: Array, rest: Array, head: Array) -> Array:
-    """(frames, 3) location of a pose bone without a parent, in units of Blender.
-
-    position  (frames, 3) of its head in the world, in units of Blender
-    places    (frames, 4, 4) armature's axes to the world's
-    rest      (3, 3) bone's axes to the armature's, in the rest pose
-    head      (3,) of the bone in the armature, in the rest pose
-    """
-    apart = (position - places[:, :3, 3])[..., None]
-    return np.asarray(((np.linalg.inv(places[:, :3, :3]) @ apart)[..., 0] - head) @ rest)
+def angles(one: Array, other: Array) -> Array:
+    """Degrees between rotations (..., 3, 3); exact for small ones too."""
+    sines = np.linalg.norm(other - one, axis=(-2, -1)) / 8.0**0.5
+    return np.asarray(2.0 * np.degrees(np.arcsin(np.minimum(sines, 1.0))))
 
 
 def axes_only(matrices: Array) -> Array:

@@ -92,12 +92,6 @@ class Reaction:
             raise ReactionError("no bone is free: select the bones that react, in Pose Mode")
         if self.frames <= self.lead:
             raise ReactionError("the frame range is empty: make the end later than the start")
-        if self.lead > self.first and not self.loop:
-            raise ReactionError(
-                f"a pre-roll of {self.lead} frames does not fit before frame {self.first}, since "
-                "Blender exports no negative frames: move the animation and the range to later "
-                f"frames, or set the pre-roll to {self.first} or less"
-            )
         if self.loop and self.floats:
             raise ReactionError(
                 "a root that floats leaves the cycle: clear Root Floats, or set Rounds to 1"

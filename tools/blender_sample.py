@@ -20,8 +20,9 @@ import bpy
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from blender.job import ACTIVE, State
-from blender.panel import register, start_job
+from blender.jobs import start_job
+from blender.panel import register
+from blender.process import IDLE, State
 
 PERIOD = 24
 """Frames of the cycle."""
@@ -220,7 +221,7 @@ def run(engine: str) -> None:
     """Run to the end, and say how long it took."""
     began = time.monotonic()
     job = start_job(bpy.context, engine)
-    while job.step() in ACTIVE:
+    while job.step() not in IDLE:
         time.sleep(0.1)
     if job.state is not State.DONE:
         raise SystemExit(job.message)

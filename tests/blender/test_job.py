@@ -9,12 +9,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from blender.job import ACTIVE, CHARACTER, Job, JobError, State, engine_command
+from blender.environment import engine_command
+from blender.job import CHARACTER, Job
 from blender.motion import read_motion
+from blender.process import IDLE, JobError, State
 from blender.reaction import Reaction
 
 import flowborne as fb
-from blender import job as jobs
+from blender import process
 
 from ..characters import rigged
 
@@ -37,7 +39,7 @@ def new_job(folder: Path, engine: tuple[str, ...] = ENGINE, **settings: object) 
 
 def finish(job: Job) -> State:
     until = time.monotonic() + 300.0
-    while job.step() in ACTIVE:
+    while job.step() not in IDLE:
         assert time.monotonic() < until, "the job does not end"
         time.sleep(0.01)
     return job.state
@@ -45,7 +47,7 @@ def finish(job: Job) -> State:
 
 def wait_for(job: Job, text: str) -> None:
     while text not in (job.folder / "log.txt").read_text():
-        assert job.step() in ACTIVE, job.message
+        assert job.step() not in IDLE, job.message
         time.sleep(0.01)
 
 
@@ -75,7 +77,7 @@ def test_a_job_is_cancelled_resumed_and_the_same(tmp_path: Path) -> None:
     assert parts.state is State.NEW
     parts.start()
     left = None
-    while left is None and parts.step() in ACTIVE:
+    while left is None and parts.step() not in IDLE:
         left = parts.seconds_left
     assert left is None or 0.0 < left < 300.0
     parts.cancel()
@@ -93,7 +95,7 @@ def test_a_job_is_cancelled_resumed_and_the_same(tmp_path: Path) -> None:
 def test_a_child_that_does_not_end_is_killed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(jobs, "GRACE_SECONDS", 0.1)
+    monkeypatch.setattr(process, "GRACE_SECONDS", 0.1)
     job = new_job(tmp_path / "job", (sys.executable, "-c", STUBBORN))
     job.start()
     wait_for(job, "ready")
@@ -119,7 +121,7 @@ def test_what_the_engine_says_is_the_message(tmp_path: Path) -> None:
     silent = new_job(tmp_path / "silent", (sys.executable, "-c", "raise SystemExit(7)"))
     silent.start()
     assert finish(silent) is State.FAILED
-    assert silent.message == "flowborne ended with code 7"
+    assert silent.message == "it ended with code 7"
     tip = new_job(tmp_path / "tip")
     tip.reaction = Reaction(("tail_tip",), {}, 1, 36, 24.0)
     tip.start()
@@ -129,7 +131,7 @@ def test_what_the_engine_says_is_the_message(tmp_path: Path) -> None:
 
 def test_engines(tmp_path: Path) -> None:
     for missing in ("", str(tmp_path), str(tmp_path / "none")):
-        with pytest.raises(JobError, match=r"there is no flowborne in .*python -m venv"):
+        with pytest.raises(JobError, match=r"there is no flowborne in .*Make Environment"):
             engine_command(missing)
     python = tmp_path / "bin" / "python"
     python.parent.mkdir()

@@ -10,12 +10,11 @@ import pytest
 from blender.motion import (
     Motion,
     MotionError,
+    angles,
     axes_only,
-    basis,
     keys_within,
     read_motion,
     same_side,
-    shift,
     turns,
 )
 from numpy.testing import assert_allclose
@@ -29,24 +28,24 @@ def some(count: int, seed: int) -> np.ndarray:
     return Rotation.random(count, random_state=seed).as_matrix()
 
 
-def test_basis_leads_from_the_parent_to_the_bone() -> None:
-    """Blender: world = parent's world, rest of the bone in its parent, basis."""
-    above, turned = some(FRAMES, 1), some(FRAMES, 2)
-    rest, rest_above = some(2, 3)
-    world = above @ rest_above.T @ rest @ turned
-    assert_allclose(basis(world, above, rest, rest_above), turned, atol=1e-12)
-
-
-def test_shift_is_in_the_axes_of_the_bone() -> None:
-    """Blender: head = armature's place, head at rest, rest of the bone times the location."""
-    (rest,), head = some(1, 4), np.array([0.1, 0.2, 0.3])
-    places = np.tile(np.eye(4), (FRAMES, 1, 1))
+def test_places_in_the_armature() -> None:
+    """World = armature's place, with its scale, times the place in the armature, without one."""
+    places, rotation = np.tile(np.eye(4), (FRAMES, 1, 1)), some(FRAMES, 1)
     places[:, :3, :3], places[:, :3, 3] = 2.5 * some(FRAMES, 5), np.arange(FRAMES)[:, None]
-    location = np.random.default_rng(6).normal(size=(FRAMES, 3))
-    inner = head + location @ rest.T
-    position = np.einsum("fij,fj->fi", places[:, :3, :3], inner) + places[:, :3, 3]
-    assert_allclose(shift(position, places, rest, head), location, atol=1e-12)
+    head = np.random.default_rng(6).normal(size=(FRAMES, 3))
+    run = Motion(("root",), ("root",), 0.1 * head[:, None], rotation[:, None])
+    inner = run.in_armature("root", 0.1, places)
+    assert_allclose((places @ inner)[:, :3, 3], head, atol=1e-12)
+    assert_allclose((places @ inner)[:, :3, :3], 2.5 * rotation, atol=1e-12)
     assert_allclose(axes_only(places), places[:, :3, :3] / 2.5, atol=1e-12)
+
+
+def test_angles_between_rotations() -> None:
+    """Of 1e-7 degrees to half a turn."""
+    exact = np.array([0.0, 1e-7, 1.0, 90.0, 180.0])
+    turned = Rotation.from_rotvec(np.outer(np.radians(exact), [0.6, 0.0, 0.8])).as_matrix()
+    start = some(5, 2)
+    assert_allclose(angles(start, start @ turned), exact, rtol=1e-6)
 
 
 def test_quaternions_stay_on_one_side() -> None:

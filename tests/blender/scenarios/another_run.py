@@ -9,13 +9,13 @@ rig = character()
 select(rig, "tail")
 bpy.ops.object.mode_set(mode="POSE")
 scene.frame_set(7)
-export_character(bpy.context, rig, FOLDER / "first.glb")
+export_character(bpy.context, rig, FOLDER / "first.glb", 1, 12)
 assert (rig.mode, scene.frame_current) == ("POSE", 7)
 assert [bone.name for bone in rig.pose.bones if bone.select] == ["tail"]
 assert bpy.context.selected_objects == [rig]
 recorded(rig)
 bake(rig)
-export_character(bpy.context, rig, FOLDER / "second.glb")
+export_character(bpy.context, rig, FOLDER / "second.glb", 1, 12)
 assert not rig.animation_data.nla_tracks[-1].mute
 
 

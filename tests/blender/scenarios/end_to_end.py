@@ -5,8 +5,8 @@ import time
 from pathlib import Path
 
 import numpy as np
-from blender.job import ACTIVE, State
-from blender.panel import start_job
+from blender.jobs import start_job
+from blender.process import IDLE, State
 
 from stage import bake, bpy, character, check_equal, new_scene, place, select
 
@@ -24,13 +24,13 @@ job = start_job(bpy.context, os.environ["FLOWBORNE_ENGINE"])
 
 
 def finish() -> None:
-    while job.step() in ACTIVE:
+    while job.step() not in IDLE:
         time.sleep(0.02)
         assert time.monotonic() - began < 300.0
 
 
 while job.frames_done < 3:
-    assert job.step() in ACTIVE, job.message
+    assert job.step() not in IDLE, job.message
     time.sleep(0.005)
 job.cancel()
 finish()

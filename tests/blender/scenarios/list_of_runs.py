@@ -4,7 +4,8 @@ import shutil
 from pathlib import Path
 from types import SimpleNamespace
 
-from blender.panel import FlowborneRunsPanel, folders_of, job_of, start_job
+from blender.jobs import folders_of, job_of, start_job
+from blender.panel import FlowborneRunsPanel
 
 from stage import FOLDER, bpy, character, new_scene, recorded, select
 

@@ -6,9 +6,9 @@ import time
 
 import numpy as np
 from blender.character import reaction_of
-from blender.job import ACTIVE, State
+from blender.jobs import start_job
 from blender.motion import read_motion
-from blender.panel import start_job
+from blender.process import IDLE, State
 from blender.reaction import ReactionError
 from mathutils import Euler
 
@@ -35,7 +35,7 @@ rig.flowborne.floats = False
 job = start_job(bpy.context, os.environ["FLOWBORNE_ENGINE"])
 assert (job.reaction.first, job.reaction.lead, job.reaction.frames) == (1, 24, 36)
 until = time.monotonic() + 300.0
-while job.step() in ACTIVE:
+while job.step() not in IDLE:
     time.sleep(0.02)
     assert time.monotonic() < until
 assert job.state is State.DONE, job.message

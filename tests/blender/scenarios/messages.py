@@ -1,7 +1,7 @@
 """What is missing is said, with the remedy; no folder is left behind."""
 
-from blender.job import JobError
-from blender.panel import start_job
+from blender.jobs import start_job
+from blender.process import JobError
 from blender.reaction import ReactionError
 
 from stage import FOLDER, bpy, character, message, new_scene, refusal, select

@@ -2,8 +2,10 @@
 
 from types import SimpleNamespace
 
-from blender.job import State
-from blender.panel import FlowbornePanel, FlowborneRun, job_of
+from blender.jobs import job_of
+from blender.operators import FlowborneRun
+from blender.panel import FlowbornePanel
+from blender.process import State
 
 from stage import bpy, character, new_scene, recorded
 
@@ -64,11 +66,8 @@ assert any("cannot be read" in line for line in drawn())
 cancelled, reported = [], []
 job = SimpleNamespace(
     state=State.RUNNING,
-    message="",
-    seconds_left=None,
-    frames_done=3,
-    cost="",
-    reaction=SimpleNamespace(frames=11),
+    active=True,
+    line="cancelled, frame 3/11",
     step=lambda: job.state,
     cancel=lambda: cancelled.append(job.state),
 )
@@ -88,7 +87,7 @@ assert after("MOUSEMOVE") == after("TIMER") == {"PASS_THROUGH"}
 assert not cancelled
 assert after("ESC") == {"PASS_THROUGH"}
 assert cancelled == [State.RUNNING]
-job.state = State.CANCELLED
+job.state, job.active = State.CANCELLED, False
 assert after("MOUSEMOVE") == {"PASS_THROUGH"}
 assert after("TIMER") == {"FINISHED"}
 assert reported == [({"INFO"}, "cancelled, frame 3/11")]

@@ -1,13 +1,12 @@
-"""A pre-roll starts the run before the range, and is not baked. With the real engine."""
+"""A pre-roll starts before the range and frame 0, and is not baked. With the real engine."""
 
 import os
 import time
 
 import numpy as np
-from blender.character import reaction_of
-from blender.job import ACTIVE, State
-from blender.panel import start_job
-from blender.reaction import ReactionError
+from blender.jobs import start_job
+from blender.motion import read_motion
+from blender.process import IDLE, State
 
 from stage import (
     BONES,
@@ -16,31 +15,34 @@ from stage import (
     bpy,
     character,
     curves,
-    message,
     new_scene,
     refusal,
     select,
+    world_of,
 )
 
-scene = new_scene(1, 16)
-rig = character()
-scene.frame_start = 11
+scene = new_scene(1, 8)
+rig = character(first=-9)
+scene.frame_start = 3
 select(rig, "tail")
-rig.flowborne.preroll = 12
-said = message(ReactionError, reaction_of, bpy.context, rig, rig.flowborne)
-assert "12 frames does not fit before frame 11" in said
 rig.flowborne.preroll = 8
+scene.frame_set(5, subframe=0.25)
 job = start_job(bpy.context, os.environ["FLOWBORNE_ENGINE"])
-assert (scene.frame_start, scene.frame_end) == (11, 16)
-assert (job.reaction.first, job.reaction.lead, job.reaction.frames) == (11, 8, 13)
+assert (scene.frame_start, scene.frame_end) == (3, 8)
+assert (scene.frame_current, scene.frame_subframe) == (5, 0.25)
+assert (job.reaction.first, job.reaction.lead, job.reaction.frames) == (3, 8, 13)
 until = time.monotonic() + 300.0
-while job.step() in ACTIVE:
+while job.step() not in IDLE:
     time.sleep(0.02)
     assert time.monotonic() < until
 assert job.state is State.DONE, job.message
+trunk = read_motion(job.run).of("trunk")[1]
+for k in (0, 4, 13):  # frames -5, -1 and 8
+    scene.frame_set(-5 + k)
+    assert np.abs(trunk[k] - world_of(rig)[1][0]).max() < 1e-3, k
 strip = bake(rig)
 for keys in curves(strip.action).values():
-    assert [frame for frame, _ in keys] == [11.0, 12.0, 13.0, 14.0, 15.0, 16.0]
+    assert [frame for frame, _ in keys] == [3.0, 4.0, 5.0, 6.0, 7.0, 8.0]
 rotation = animation(rig)[1]
 for k in range(6):
     with np.load(job.run / "states" / f"{8 + k:06}.npz") as state:

@@ -14,7 +14,7 @@ select(rig, "tail")
 reaction = reaction_of(bpy.context, rig, rig.flowborne)
 assert abs(reaction.rate - 30.0 / 1.001) < 1e-5
 assert reaction.frames == 30
-export_character(bpy.context, rig, FOLDER / "c.glb")
+export_character(bpy.context, rig, FOLDER / "c.glb", 1, 31)
 assert scene.render.fps_base == bpy.context.scene.render.fps_base
 assert abs(scene.render.fps_base - 1.001) < 1e-6
 content = (FOLDER / "c.glb").read_bytes()

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import json
 import math
+import os
+import subprocess
 import sys
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -42,8 +44,29 @@ def new_scene(first: int = 1, last: int = 12) -> Any:
     return scene
 
 
-def character(name: str = "rig", modes: Sequence[str] = ("QUATERNION",) * 3) -> Any:
-    """An armature of three bones with a box bound to it, and an action that moves all bones."""
+def install_extension() -> str:
+    """Build the extension, install it as a user does, and return the name of its module."""
+    (builder,) = Path(bpy.utils.system_resource("SCRIPTS")).rglob("blender_ext.py")
+    source, archive = Path(blender.__file__).parent, FOLDER / "flowborne.zip"
+    for command in (
+        ("build", "--source-dir", source, "--output-filepath", archive),
+        ("validate", archive),
+    ):
+        subprocess.run([sys.executable, builder, *command], check=True)
+    assert Path(bpy.utils.user_resource("EXTENSIONS")).is_relative_to(
+        os.environ["BLENDER_USER_RESOURCES"]
+    )
+    bpy.ops.extensions.package_install_files(
+        filepath=str(archive), repo="user_default", enable_on_install=True
+    )
+    return "bl_ext.user_default.flowborne"
+
+
+def character(
+    name: str = "rig", modes: Sequence[str] = ("QUATERNION",) * 3, first: int | None = None
+) -> Any:
+    """An armature of three bones with a box bound to it, and an action that moves all bones, from
+    the first frame of the scene or another one."""
     scene = bpy.context.scene
     armature = bpy.data.objects.new(name, bpy.data.armatures.new(name))
     scene.collection.objects.link(armature)
@@ -58,9 +81,10 @@ def character(name: str = "rig", modes: Sequence[str] = ("QUATERNION",) * 3) -> 
         edited.parent, parent = parent, edited
     bpy.ops.object.mode_set(mode="OBJECT")
     bind(armature)
+    first = scene.frame_start if first is None else first
     for bone, mode in zip(armature.pose.bones, modes, strict=True):
         bone.rotation_mode = mode
-    for frame in range(scene.frame_start, scene.frame_end + 1):
+    for frame in range(first, scene.frame_end + 1):
         for number, bone in enumerate(armature.pose.bones):
             turn = Euler((0.2 * math.sin(0.5 * frame + number), 0.1 * number, 0.05 * frame))
             set_rotation(bone, turn.to_quaternion())
@@ -70,8 +94,8 @@ def character(name: str = "rig", modes: Sequence[str] = ("QUATERNION",) * 3) -> 
     return armature
 
 
-def bind(armature: Any) -> None:
-    """Bind a closed box around the bones to an armature."""
+def bind(armature: Any, bones: Sequence[str] = BONES) -> None:
+    """Bind a closed box around three bones, which are at JOINTS, to an armature."""
     rings = np.linspace(JOINTS[0], JOINTS[-1], 21)
     corners = [(-0.15, 0.9), (0.15, 0.9), (0.15, 1.1), (-0.15, 1.1)]
     points = [(x, y, z) for y in rings for x, z in corners]
@@ -85,7 +109,7 @@ def bind(armature: Any) -> None:
     body = bpy.data.objects.new(f"{armature.name} body", mesh)
     bpy.context.scene.collection.objects.link(body)
     body.parent = armature
-    for number, bone in enumerate(BONES):
+    for number, bone in enumerate(bones):
         group = body.vertex_groups.new(name=bone)
         low, high = JOINTS[number] if number else -1.0, JOINTS[number + 1] if number < 2 else 9.0
         for vertex, (_, y, _) in enumerate(points):
