@@ -181,16 +181,16 @@ def test_limits_hold_and_are_told(tmp_path: Path) -> None:
     with arm(tmp_path) as simulation:
         report = simulation.advance_frame({"hinge": Position(2.0), "wrist": Torque(5.0)})
         assert simulation.joint("hinge").position[0] == pytest.approx(np.pi / 3)
-        assert report.beyond == ("hinge: 2 rad or m from here was told, its limit is 1.047",)
+        assert report.beyond == ("hinge: 2 is beyond its limit of 1.047 rad",)
         report = simulation.advance_frame({"hinge": Torque(-1000.0)})
         assert simulation.joint("hinge").drive[0] == -40.0
-        assert report.beyond == ("hinge: -1000 N m or N was told, its limit is -40",)
+        assert report.beyond == ("hinge: -1000 is beyond its limit of -40 N m or N",)
 
 
 @pytest.mark.parametrize(
     ("commands", "said"),
     [
-        ({"elbow": Torque(1.0)}, "no joint 'elbow' in the model. It has: hinge, wrist"),
+        ({"elbow": Torque(1.0)}, "the model has no joint 'elbow'. It has: hinge, wrist"),
         ({"hinge": 1.0}, "the command to 'hinge' is 1.0: give a Position, a Vel"),
         ({"hinge": Torque(np.nan)}, "the command to 'hinge' has nan: give a finite number"),
         ({"hinge": Velocity([1.0, 2.0])}, r"the command to 'hinge' has \[1.0, 2.0\]: give a"),

@@ -329,7 +329,7 @@ APPENDED_FAULT = {
     ),
     "a constant that is text": (
         FORMULA.replace("0.3", '"0.3"'),
-        "scene swim.toml, constants height: '0.3' is not a number. Give a number without quotes.",
+        "scene swim.toml, constants height: '0.3' is not a number. Give a number, without quotes.",
     ),
     "a drive without force": (
         '[[motion]]\nkind = "constant"\njoint = "rail"\ntorque_limit = 0.0',

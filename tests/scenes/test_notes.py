@@ -39,3 +39,10 @@ def test_a_flow_that_creeps_is_told() -> None:
         scene = load_scene("ns-block-drag-max", {"fluid.viscosity": viscosity})
         notes = " ".join(notes_of(scene, build(scene).world.setup.solid))
         assert ("[fluid]: creeping: nu dt / h^2 is" in notes) == told
+
+
+def test_a_film_without_the_dye_is_told() -> None:
+    for field, told in (("dye", False), ("vorticity", True)):
+        scene = load_scene("ns-block-drag-max", {"film.field": field})
+        notes = " ".join(notes_of(scene, build(scene).world.setup.solid))
+        assert ('[[dye]]: the film shows vorticity; [film] field = "dye"' in notes) == told

@@ -103,7 +103,7 @@ def test_a_script_tells_thrusters_within_their_range(tmp_path: Path) -> None:
     with Simulation(hull(tmp_path), workers=1) as simulation:
         report = simulation.advance_frame({"aft": fb.Control(-7.0)})
         row = simulation.measure()
-        assert report.beyond == ("aft: -7 N or 1/s was told, its limit is -5",)
+        assert report.beyond == ("aft: -7 is beyond its limit of -5 N or 1/s",)
         assert row["thrust_aft_N"] == -5.0
         simulation.advance_frame({"side": fb.Control(1.0)})
         row = simulation.measure()

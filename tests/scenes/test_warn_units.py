@@ -71,7 +71,7 @@ def test_no_built_in_scene_is_in_another_unit(name: str) -> None:
     scene = load_scene(name)
     setup = build(scene).world.setup
     kinds = [kind for kind in WARNINGS if kind.__module__ == warn_units.__name__]
-    assert len(kinds) == 7
+    assert len(kinds) == 8
     assert [w for kind in kinds for w in kind(scene, setup)] == []
 
 
@@ -110,6 +110,32 @@ def test_a_grain_in_kilometres(swung: Swung) -> None:
     new = {'size="0.05 0.05 0.2" pos="0 0 -0.2"': 'size="5e-5 5e-5 2e-4" pos="0 0 -2e-4"'}
     scene = swung(new | {"<compiler ": '<compiler boundmass="1e-6" boundinertia="1" '})
     assert "and they measure 0.371 m if in kilometres" in said(scene)[0]
+
+
+CLIP = Path(__file__).parent / "clips" / "pybvh-test2.bvh"
+
+
+def clip_in(folder: Path, turned: float = 1.0, frame_time: str | None = None) -> list[str]:
+    """What is said of the clip with angles times `turned` and another frame time."""
+    head, motion = CLIP.read_text().split("MOTION")
+    lines = motion.strip().splitlines()
+    rows = np.array([line.split() for line in lines[2:]], float)
+    rows[:, 3:] *= turned  # all joints but the root have angles alone
+    time = lines[1] if frame_time is None else f"Frame Time: {frame_time}"
+    body = "\n".join(" ".join(f"{x:.9g}" for x in row) for row in rows)
+    (folder / "walk.bvh").write_text(f"{head}MOTION\n{lines[0]}\n{time}\n{body}\n")
+    scene = 'human = {}\n[time]\nframes = 2\n[clip]\nfile = "walk.bvh"\n'
+    (folder / "walk.toml").write_text(scene)
+    loaded = load_scene(folder / "walk.toml")
+    return list(warn_units.clips(loaded, build(loaded).world.setup))
+
+
+def test_a_clip_in_other_units_is_told(tmp_path: Path) -> None:
+    assert clip_in(tmp_path) == []
+    (said,) = clip_in(tmp_path, turned=np.pi / 180.0)
+    assert "those of BVH files are in degrees" in said
+    (said,) = clip_in(tmp_path, frame_time="33.3")
+    assert "33.3 s, 0.03 frames per second; the unit of frame times is the second" in said
 
 
 def test_people_weigh_what_people_do(swung: Swung) -> None:

@@ -2,6 +2,7 @@
 
 import copy
 import os
+import pickle
 import threading
 import time
 
@@ -69,6 +70,14 @@ def test_a_copy_is_advanced_on_its_own(small_scene):
         with simulation._turn:
             assert copy.deepcopy(simulation).advance_frame().frame == 1
         assert simulation.frame == 0
+
+
+def test_a_simulation_is_not_pickled(small_scene):
+    with (
+        Simulation(small_scene, workers=1) as simulation,
+        pytest.raises(TypeError, match="give the other process its scene"),
+    ):
+        pickle.dumps(simulation)
 
 
 def test_a_fork_advances_to_the_same_bits(small_scene):

@@ -187,7 +187,7 @@ def test_bad_text_and_unknown_names_are_refused() -> None:
         SolidModel.from_string("<mujoco><worldbody><boy/></worldbody></mujoco>")
     with pytest.raises(ValueError, match=r"nowhere\.xml cannot be read"):
         SolidModel.from_file("nowhere.xml")
-    with pytest.raises(ValueError, match=r"no joint 'wirst' in the model\. It has: joint0"):
+    with pytest.raises(ValueError, match=r"the model has no joint 'wirst'"):
         one_body('<geom size="1"/>').dofs_of("wirst")
 
 

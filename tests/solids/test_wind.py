@@ -80,7 +80,7 @@ def test_K1_uniform_force_acts_at_the_centre_of_mass() -> None:
 def test_bodies_are_chosen_by_name() -> None:
     assert np.all(wrench(WindForce((1.0, 0.0, 0.0), ("end",)), 0.0)[1] == 0.0)
     assert np.all(wrench(WindFaces((1.0, 0.0, 0.0), RHO, ("block",)), 0.0)[2] == 0.0)
-    with pytest.raises(ValueError, match="no body 'ned' in the model"):
+    with pytest.raises(ValueError, match="the model has no body 'ned'"):
         wrench(WindForce((1.0, 0.0, 0.0), ("ned",)), 0.0)
 
 

@@ -39,7 +39,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     try:
         code = app(given or ["--help"], prog_name="flowborne", standalone_mode=False)
     except UsageError as error:
-        complain(f"{sentence_of(error)}; see flowborne --help")
+        command = getattr(getattr(error, "ctx", None), "command_path", "flowborne")
+        complain(f"{sentence_of(error)}; see {command} --help")
         code = WRONG
     except (InputError, RunFolderError, SceneError) as error:
         for problem in getattr(error, "problems", [str(error)]):

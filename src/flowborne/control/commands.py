@@ -10,13 +10,12 @@ from typing import Any
 import numpy as np
 
 from flowborne.base.errors import SceneError
-from flowborne.base.phrases import suggestion
 from flowborne.control.creature import within_range
 from flowborne.coupling.world import Setup, World
 from flowborne.kernels.arrays import Array, Integers
 from flowborne.solids.actuators import ActuatorServo, actuator_servos, unusable_actuator
 from flowborne.solids.force import Force, check_force
-from flowborne.solids.model import FREE, SolidModel
+from flowborne.solids.model import BALL, FREE, SLIDE, SolidModel, joint_kind
 from flowborne.solids.motors import Controls, control_range, driven_by, inputs_of
 from flowborne.solids.trajectories import (
     Servo,
@@ -164,10 +163,10 @@ def told_by(
 
 def _controlled(model: SolidModel, name: str, command: Control) -> tuple[int, Array, list[str]]:
     """Number of an actuator, its controls (k,) within their range, and what was beyond it."""
-    if name not in model.actuator_names:
-        end = suggestion(name, model.actuator_names, "Its actuators are")
-        raise SceneError(f"the model has no actuator '{name}'{end}")
-    number = model.actuator(name)
+    try:
+        number = model.actuator(name)
+    except ValueError as error:
+        raise SceneError(str(error)) from None
     if wrong := unusable_actuator(model, number):
         raise SceneError(wrong)
     low, high = control_range(model, number)
@@ -213,7 +212,10 @@ def _knots(
             then = _pose(model, joint, goal, command.then)
     allowed, said = within_range(model, here, move), list[str]()
     if not np.array_equal(allowed, move):
-        said = _said(joint, move[dofs], allowed[dofs], "rad or m from here")
+        kind, at = joint_kind(model, joint), model.positions_of(joint)
+        start = here[at] if at.size == 1 else 0.0
+        unit = "rad from here" if kind == BALL else "m" if kind == SLIDE else "rad"
+        said = _said(joint, start + move[dofs], start + allowed[dofs], unit)
         goal = model.integrate(here, allowed, 1.0)
     onwards = allowed if then is None else model.difference(goal, then)
     if then is None or not np.array_equal(within_range(model, goal, onwards), onwards):
@@ -250,7 +252,7 @@ def _driven_dofs(model: SolidModel, joint: str) -> Integers:
     try:
         dofs = model.dofs_of(joint)
     except ValueError as error:
-        raise SceneError(f"{error}") from None
+        raise SceneError(str(error)) from None
     if model.mj.jnt_type[model.joint(joint)] == FREE:
         raise SceneError(f"'{joint}' is a free joint, which nothing drives: tell other joints")
     if model.locked[dofs].any():
@@ -286,8 +288,8 @@ def torque_limit(model: SolidModel, joint: str, servo: Servo) -> Array:
 
 
 def _said(joint: str, wanted: Array, given: Array, unit: str) -> list[str]:
-    """That a joint got less than it was told."""
+    """That what was wanted of a joint, an actuator or a thruster is beyond its limit."""
     if np.array_equal(wanted, given):
         return []
     told, got = (", ".join(f"{x:.4g}" for x in values) for values in (wanted, given))
-    return [f"{joint}: {told} {unit} was told, its limit is {got}"]
+    return [f"{joint}: {told} is beyond its limit of {got} {unit}"]

@@ -17,7 +17,7 @@ from flowborne.scenes.schema import Scene, TimeTable
 Key = str | int
 
 WHAT = {
-    "float_type": "is not a number. Give a number without quotes",
+    "float_type": "is not a number. Give a number, without quotes",
     "int_type": "is not a whole number. Give a whole number",
     "int_from_float": "is not a whole number. Give a whole number",
     "finite_number": "is not a finite number. Give a finite number",

@@ -59,6 +59,8 @@ def notes_of(scene: Scene, model: SolidModel) -> Iterator[str]:
     yield from _longer_sides(scene)
     yield from window_notes(scene)
     yield from _creeping(scene)
+    if scene.dye and scene.film.field != "dye":
+        yield (f'[[dye]]: the film shows {scene.film.field}; [film] field = "dye" shows the dye')
 
 
 def _creeping(scene: Scene) -> Iterator[str]:

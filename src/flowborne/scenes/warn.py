@@ -39,6 +39,7 @@ from flowborne.scenes.warn_speed import fast_bodies, fast_flow, unlike_the_sea
 from flowborne.scenes.warn_stops import past_stops, soft_stops
 from flowborne.scenes.warn_trim import counted_twice, pinned_under_lid
 from flowborne.scenes.warn_units import (
+    clips,
     densities_alone,
     gravity,
     inertias,
@@ -193,6 +194,7 @@ WARNINGS: tuple[Warn, ...] = (
     fast_flow,
     slow_steps,
     ranges,
+    clips,
     angles_in_radians,
     too_slow,
     limp_joints,

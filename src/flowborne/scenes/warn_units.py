@@ -13,6 +13,7 @@ from flowborne.base.tables import MOST_STEPS
 from flowborne.coupling.world import Setup
 from flowborne.kernels.arrays import Array, Integers
 from flowborne.scenes.bodies import initial_state
+from flowborne.scenes.capture import capture_of
 from flowborne.scenes.creature import creature_extent
 from flowborne.scenes.schema import Scene
 from flowborne.scenes.warn_bodies import DENSEST, mean_densities
@@ -53,6 +54,10 @@ short."""
 
 ENOUGH_STEPS = 20
 """Steps of a period with which that is 0.8 %."""
+
+SLOWEST_CAPTURE, FASTEST_CAPTURE = 5.0, 1000.0
+"""Frames per second: sketches of animators, and the fastest cameras of motion capture. A frame time
+in ms has less, one in place of its inverse as well."""
 
 NUDGE = 1e-5
 """rad or m by which a joint is moved for the stiffness that it has."""
@@ -162,6 +167,25 @@ def _ends(model: SolidModel) -> dict[str, float]:
     mj = model.mj
     turning = np.flatnonzero(np.isin(mj.jnt_type, (HINGE, BALL)) & (mj.jnt_limited != 0))
     return {model.joint_names[j]: float(np.abs(mj.jnt_range[j]).max()) for j in turning}
+
+
+def clips(scene: Scene, setup: Setup) -> Iterator[str]:
+    """A clip whose frame time is not in s, or whose angles are those of a file in radians."""
+    capture = capture_of(scene)
+    if scene.clip is None or scene.clip.file is None or capture is None:
+        return
+    file, clip = scene.clip.file, capture.clip
+    if not SLOWEST_CAPTURE <= (rate := 1.0 / clip.frame_time) <= FASTEST_CAPTURE:
+        yield (
+            f"[clip]: {file} has a frame time of {clip.frame_time:.3g} s, {rate:.3g} frames per "
+            "second; the unit of frame times is the second, as 0.0333 for 30 frames per second"
+        )
+    largest = 2.0 * math.acos(min(1.0, float(np.abs(clip.rotations[:, 1:, 0]).min(initial=1.0))))
+    if file.lower().endswith(".bvh") and 0.0 < largest <= math.radians(FULL_TURN):
+        yield (
+            f"[clip]: no joint of {file} turns by more than {math.degrees(largest):.3g}, as in a "
+            "file whose angles are in radians; those of BVH files are in degrees"
+        )
 
 
 def slow_steps(scene: Scene, setup: Setup) -> Iterator[str]:

@@ -117,7 +117,7 @@ class Columns:
         bodies: tuple[str, ...] = (),
         joints: bool | tuple[str, ...] = True,
         outside: Outside = Outside(),  # noqa: B008 (never changes)
-        ellipsoids: EllipsoidModel | None = None,
+        uniform: tuple[float, ...] | None = None,
     ) -> None:
         self._controller = controller
         dofs = np.zeros(0, np.int64) if controller is None else controller.dofs
@@ -129,7 +129,7 @@ class Columns:
             Quantity(sensor_columns(setup.solid), sensor_values, False),
             *of_objective(controller),
             *of_forces(stream, dofs),
-            *of_ellipsoids(ellipsoids, stream),
+            *of_ellipsoids(setup, stream, uniform),
             *of_applied(setup, outside.bodies),
             *of_bodies(setup.solid, bodies),
             *of_fluid(setup),
@@ -313,12 +313,14 @@ def of_forces(stream: tuple[float, ...] | None, controlled: Integers) -> Iterato
 
 
 def of_ellipsoids(
-    flow: EllipsoidModel | None, stream: tuple[float, ...] | None
+    setup: Setup, stream: tuple[float, ...] | None, uniform: tuple[float, ...] | None
 ) -> Iterator[Quantity]:
-    """What MuJoCo's ellipsoid fluid model would give for the motion at the frame's end."""
-    if flow is None:
+    """What MuJoCo's ellipsoid fluid model would give for the motion at the frame's end in a flow
+    of velocity `uniform`, m/s."""
+    fluid, (along, _) = setup.fluid, axes_of(stream)
+    if fluid is None or uniform is None:
         return
-    along, _ = axes_of(stream)
+    flow = EllipsoidModel(setup.solid, fluid.density, fluid.viscosity, uniform)
 
     def values(now: Snapshot) -> list[float]:
         if np.isnan(now.sensed.dt):

@@ -39,7 +39,6 @@ from flowborne.sim.columns import Columns, Outside
 from flowborne.sim.frame import PARTS, FrameReport, Snapshot
 from flowborne.sim.trouble import trouble
 from flowborne.sim.turn import Turn
-from flowborne.solids.ellipsoids import EllipsoidModel
 from flowborne.solids.model import FREE
 from flowborne.solids.motors import activations_of, driven_by, outputs_of
 from flowborne.solids.sensed import ActuatorState, BodyState, JointState
@@ -103,6 +102,7 @@ class Simulation:
         from flowborne.scenes.build import build
         from flowborne.scenes.load import scene_of
 
+        self._turn = Turn()
         self.scene: Scene = scene_of(scene)
         count = workers or default_workers(
             len(self.scene.controlled_joints()), self.scene.has_fluid
@@ -117,10 +117,6 @@ class Simulation:
         actuators, policy = self.scene.told_actuators(), self.scene.policy
         told, pushed = ((), ()) if policy is None else (policy.joints, policy.bodies)
         told += joints_of_actuators(model, actuators)
-        ellipsoids, fluid = None, world.setup.fluid
-        if output.ellipsoid_model and fluid is not None:
-            uniform = self.scene.fluid_velocity()
-            ellipsoids = EllipsoidModel(model, fluid.density, fluid.viscosity, uniform)
         self.columns = Columns(
             world.setup,
             self.controller,
@@ -128,7 +124,7 @@ class Simulation:
             output.bodies,
             output.joints,
             Outside(told, actuators, pushed),
-            ellipsoids,
+            self.scene.fluid_velocity() if output.ellipsoid_model else None,
         )
         self._controls = scene_controls(self.scene.actuator, model, self.scene.constants)
         self._changes: tuple[ChangeTable, ...] = self.scene.changes
@@ -136,7 +132,6 @@ class Simulation:
         self._policy = None if policy is None else policy.build()
         self._moment = Snapshot(world, 0, None)
         self._started = False
-        self._turn = Turn()
         self._step: Step = step
 
     def __repr__(self) -> str:

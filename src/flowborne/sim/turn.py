@@ -26,3 +26,9 @@ class Turn:
 
     def __deepcopy__(self, memo: object) -> Turn:
         return Turn()
+
+    def __reduce__(self) -> str:
+        raise TypeError(
+            "a simulation cannot be pickled: give the other process its scene, and make a "
+            "Simulation there"
+        )

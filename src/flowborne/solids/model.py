@@ -13,6 +13,7 @@ import numpy as np
 
 from flowborne.base.arguments import PATH, POSITIVE, TEXT, VECTOR, or_none, takes
 from flowborne.base.one_line import one_line
+from flowborne.base.phrases import suggestion
 from flowborne.kernels.arrays import Array, Integers, Mask
 from flowborne.kernels.triangles import distances_to_mesh
 from flowborne.shapes.own import PlacedShape
@@ -409,7 +410,8 @@ def _names(mj: mujoco.MjModel, kind: mujoco.mjtObj, count: int) -> tuple[str, ..
 
 def _number(numbers: Mapping[str, int], name: str, what: str) -> int:
     if not isinstance(name, str) or name not in numbers:
-        raise ValueError(f"no {what} '{name}' in the model. It has: {', '.join(numbers)}.")
+        end = suggestion(str(name), numbers, "It has")
+        raise ValueError(f"the model has no {what} '{name}'{end}")
     return numbers[name]
 
 

@@ -207,7 +207,7 @@ class Picture:
         axes.add_collection(
             PolyCollection([key], facecolors=style.FORCE, edgecolors=style.EDGE, linewidths=0.8)
         )
-        return _write(axes, x + pixels + 8, middle, f"{force:g} {forces.unit}")
+        return _write(axes, x + pixels + 8, middle, f"{force:,.12g} {forces.unit}")
 
     def _words(self, time: float, row: int | None) -> str:
         """The time and the positions of the first joints, each of constant width."""

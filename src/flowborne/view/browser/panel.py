@@ -91,7 +91,7 @@ def _force(forces: Forces) -> str:
         "display:inline-block;vertical-align:middle;border:5px solid transparent;"
         f"border-left:9px solid {style.FORCE};border-right:0;margin-right:8px"
     )
-    what = f"force on a body: {force:g} {forces.unit}"
+    what = f"force on a body: {force:,.12g} {forces.unit}"
     return f'<span style="{line}"></span><span style="{head}"></span>{what}'
 
 
