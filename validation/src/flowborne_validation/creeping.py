@@ -1,4 +1,4 @@
-"""Flow without inertia: C1 to C4."""
+"""Flow without inertia: C1 to C5."""
 
 from __future__ import annotations
 
@@ -150,3 +150,51 @@ def array_drag(cells: int, diameter: float) -> float:
     advance(world, 10.0, 3)
     through = world.flow()[1].velocity[0][0].mean()  # of a plane that the sphere does not reach
     return float(push / (3.0 * np.pi * viscosity * diameter * through))
+
+
+CYCLE = np.radians([[-45, 45, 45, -45, -45], [-45, -45, 45, 45, -45]])
+"""Angles of Purcell's swimmer at its left and its right hinge, in quarters of a cycle."""
+
+AHEAD = 0.46
+"""rad, of its middle link at the start, by which it gets along x."""
+
+BASIN = 4.0, 3.0, 1.0
+"""m, sides of the closed box in the middle of which it starts; its walls slip."""
+
+
+def three_links(cells: int) -> World:
+    """Purcell's swimmer, whose hinges go through their cycle in 1 s. Its links are 1 m long between
+    the hinges, four times their diameter; Re is 0.1 at most.
+
+    cells  across a link
+    """
+    h, (x, y, z) = 0.25 / cells, BASIN
+    middle = f'<body>{PLANAR}<geom type="capsule" fromto="-0.5 0 0 0.5 0 0" size="0.125"/>'
+    for side in (-1, 1):
+        rod = f'<geom type="capsule" fromto="0 0 0 {side} 0 0" size="0.125"/>'
+        middle += f'<body pos="{0.5 * side} 0 0"><joint type="hinge" axis="0 0 1"/>{rod}</body>'
+    motions = [Curve((0.0, 0.25, 0.5, 0.75, 1.0), tuple(angles)) for angles in CYCLE]
+    world = make_world(
+        mjcf(f"{middle}</body>"),
+        Grid((round(x / h), round(y / h), round(z / h)), h, (-0.5 * x, -0.5 * y, -0.5 * z)),
+        solid_density=DENSITY,
+        density=DENSITY,
+        viscosity=1e5,
+        motions=tuple(TrajectoryKeyframes(np.array([3 + n]), m) for n, m in enumerate(motions)),
+    )
+    world.solid.q[2:] = AHEAD, *CYCLE[:, 0]
+    return world
+
+
+def purcell_swimmer(cells: int, steps: int) -> Figures:
+    """C5: displacement of Purcell's swimmer in a cycle, over the length of a link.
+
+    cells  across a link
+    steps  in a cycle
+    """
+    world, dt = three_links(cells), 1.0 / steps
+    start(world, dt)
+    advance(world, dt, steps)
+    way = float(np.hypot(*world.solid.q[:2]))
+    line = f"turned by {np.degrees(world.solid.q[2] - AHEAD):.2f} degrees in a cycle"
+    return {"displacement per cycle": Figure(way, lines=[line])}
