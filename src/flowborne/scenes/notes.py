@@ -26,6 +26,7 @@ from flowborne.scenes.bodies import (
     own_pose,
     posed,
     spec_of,
+    steps_of_contacts,
     trajectories_of,
 )
 from flowborne.scenes.capture import capture_of
@@ -59,6 +60,12 @@ def notes_of(scene: Scene, model: SolidModel) -> Iterator[str]:
     yield from _longer_sides(scene)
     yield from window_notes(scene)
     yield from _creeping(scene)
+    steps = scene.time.steps_per_frame
+    if steps > 1 and steps == steps_of_contacts(scene, model):
+        yield (
+            f"[time]: a frame has {steps} steps, as contacts of the model with its floor are as "
+            "stiff as that (solref); time.steps_per_frame gives another number"
+        )
 
 
 def _creeping(scene: Scene) -> Iterator[str]:

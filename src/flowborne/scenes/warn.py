@@ -42,6 +42,7 @@ from flowborne.scenes.warn_units import (
     densities_alone,
     gravity,
     inertias,
+    model_in_centimetres,
     ranges,
     sizes,
     slow_steps,
@@ -175,6 +176,7 @@ Warn = Callable[[Scene, Setup], Iterator[str]]
 WARNINGS: tuple[Warn, ...] = (
     sizes,
     gravity,
+    model_in_centimetres,
     winds,
     densities_alone,
     inertias,
