@@ -184,6 +184,11 @@ def _elements(scene: Scene, spec: MjSpec, model: SolidModel) -> Iterator[str]:
     keys = [key.name or f"keyframe {n}" for n, key in enumerate(spec.keys)]
     if keys and scene.initial.keyframe is None:
         yield f"keyframes {listed(keys)}, of which [initial] keyframe takes one"
+    for key in spec.keys:
+        parts = ("ctrl", "controls"), ("mpos", "mocap positions"), ("mquat", "mocap orientations")
+        unused = [words for part, words in parts if len(getattr(key, part))]
+        if unused and key.name == scene.initial.keyframe:
+            yield f"{listed(unused)} of keyframe '{key.name}'"
     assert scene.solids is not None
     hold, told = scene.solids.hold, scene.told_actuators()
     servos = {
