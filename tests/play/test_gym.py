@@ -206,9 +206,9 @@ def test_actuators_that_cannot_be_told_are_refused(
 @pytest.mark.parametrize(
     ("fin", "actuators", "said"),
     [
-        ("fin", ("rudder",), "'rudder' drives joint 'fin', and so does another"),
-        ("port", ("port",), "'port' is named 'port', and so does another"),
-        ("fin", ("port", "port"), "'port' is named 'port', and so does another"),
+        ("fin", ("rudder",), "'rudder' drives joint 'fin', which is among the joints"),
+        ("port", ("port",), "the policy tells two of the name 'port'"),
+        ("fin", ("port", "port"), "the policy tells two of the name 'port'"),
     ],
 )
 def test_a_joint_or_a_name_is_told_once(

@@ -212,17 +212,19 @@ class SceneEnv(gymnasium.Env):  # type: ignore[name-defined]
 
     def _check_told_once(self) -> None:
         """Raise SceneError where two numbers of an action would tell the same joint or name."""
-        model = self.simulation.setup.solid
-        told = list(self._joints)
-        for name in self._actuators:
-            joint = joint_of(model, model.actuator(name))
-            if joint in self._joints or name in told:
-                what = f"drives joint '{joint}'" if joint in self._joints else f"is named '{name}'"
+        model, told = self.simulation.setup.solid, [*self._joints, *self._actuators]
+        for name in told:
+            if told.count(name) > 1:
                 raise SceneError(
-                    f"scene {self.scene.name}: actuator '{name}' {what}, and so does another joint "
-                    "or actuator that the policy tells. Keep one of them."
+                    f"scene {self.scene.name}: the policy tells two of the name '{name}'. Give it "
+                    "one of them, or another name in the model."
                 )
-            told.append(name)
+        for name in self._actuators:
+            if (joint := joint_of(model, model.actuator(name))) in self._joints:
+                raise SceneError(
+                    f"scene {self.scene.name}: actuator '{name}' drives joint '{joint}', which is "
+                    "among the joints of the policy. Keep one of the two."
+                )
 
     def _limits(self) -> tuple[Array, Array]:
         """(n,) what -1 and 1 mean."""
