@@ -96,6 +96,7 @@ def test_what_is_wrong_with_a_file_is_one_message(
     (tmp_path / "cut.usda").write_text("none")
     for name, said in (
         ("cat.fbx", r"there is no file .*cat\.fbx\. Correct its name"),
+        ("cat.xml", r"cat\.xml is a model, which needs no import.*under \[solids\]"),
         ("cat.max", r"cat\.max is none of \.glb, \.gltf, \.vrm, \.fbx, \.usd"),
         ("cat.glb", r"there is no file .*cat\.glb\. Correct its name"),
         ("cut.glb", r"cut\.glb cannot be read as glTF: it has no JSON chunk. Export it again"),

@@ -190,6 +190,65 @@ def test_several_actuators_of_a_joint_add(tmp_path: Path) -> None:
         assert simulation.world.solid.q == pytest.approx(wanted, abs=2e-3)
 
 
+ONE_SIDED = {
+    "forcerange": '<position name="flexor" joint="elbow" kp="2" forcerange="-.1 .01"/>',
+    "no pull": '<position name="flexor" joint="elbow" kp="2" forcerange="0 .05"/>',
+    "negative gear": '<position name="flexor" joint="elbow" gear="-1" kp="2" forcerange="0 .1"/>',
+}
+
+
+@pytest.mark.parametrize("actuator", ONE_SIDED.values(), ids=[*ONE_SIDED])
+@pytest.mark.parametrize("u", [0.6, -0.6])
+def test_a_servo_with_more_force_to_one_side_exerts_that_of_mujoco(
+    tmp_path: Path, actuator: str, u: float
+) -> None:
+    """A drive has one limit for both sides, so it is none."""
+    wanted, _ = in_mujoco(actuator, [u], 0.25)
+    with arm(tmp_path, actuator, 480) as simulation:
+        for _ in range(120):
+            simulation.advance_frame({"flexor": Control(u)})
+        assert simulation.world.solid.q == pytest.approx(wanted, abs=3e-3)
+
+
+def test_a_servo_keeps_the_torque_limit_of_its_joint(tmp_path: Path) -> None:
+    """As MuJoCo's, whose actuators together exert no more than the joint's actuatorfrcrange."""
+    servo = '<position name="flexor" joint="elbow" kp="20"/>'
+    with arm(tmp_path, servo) as simulation:
+        text = (tmp_path / "arm.xml").read_text()
+        simulation.close()
+    limited = text.replace('name="elbow"', 'name="elbow" actuatorfrcrange="-.1 .1"')
+    (tmp_path / "arm.xml").write_text(limited)
+    with Simulation(tmp_path / "arm.toml", workers=1) as simulation:
+        drives = []
+        for _ in range(10):
+            simulation.advance_frame({"flexor": Control(1.0)})
+            drives.append(simulation.joint("elbow").drive[0])
+    assert max(np.abs(drives)) == pytest.approx(0.1, rel=1e-9)
+
+
+def test_an_actuator_of_two_controls_is_told_both(tmp_path: Path) -> None:
+    """MuJoCo's PID takes a position and a velocity."""
+    pid = '<pid name="flexor" joint="elbow" kp="2" kv="0.1"/>'
+    wanted, _ = in_mujoco(pid, [0.4, 0.2], 0.25)
+    with arm(tmp_path, pid, 480) as simulation:
+        for _ in range(120):
+            simulation.advance_frame({"flexor": Control([0.4, 0.2])})
+        assert simulation.world.solid.q == pytest.approx(wanted, abs=3e-3)
+        assert simulation.actuator("flexor").force.shape == (1,)
+
+
+@pytest.mark.parametrize("command", [fb.Position(0.1), fb.Velocity(1.0), Torque(0.1)])
+@pytest.mark.parametrize("actuator", ["motor", "position"])
+def test_a_joint_is_told_by_itself_or_by_its_actuator(
+    tmp_path: Path, command: fb.Position, actuator: str
+) -> None:
+    """Two commands would move it, and one of them would be lost."""
+    with arm(tmp_path, f'<{actuator} name="flexor" joint="elbow"/>') as simulation:
+        with pytest.raises(fb.SceneError, match=r"'flexor' drives joint 'elbow', which has a comm"):
+            simulation.advance_frame({"elbow": command, "flexor": Control(0.1)})
+        simulation.advance_frame({"hinge": command, "flexor": Control(0.1)})
+
+
 FALLING = """<mujoco><worldbody><body name="box"><freejoint/>
   <geom type="box" size=".1 .2 .3" density="500"/><site name="imu" pos=".05 0 0"/>
 </body></worldbody>

@@ -203,6 +203,27 @@ def test_actuators_that_cannot_be_told_are_refused(
         SceneEnv(vehicle(tmp_path), **{"reward": along_x, **given})  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize(
+    ("fin", "actuators", "said"),
+    [
+        ("fin", ("rudder",), "'rudder' drives joint 'fin', which is among the joints"),
+        ("port", ("port",), "the policy tells two of the name 'port'"),
+        ("fin", ("port", "port"), "the policy tells two of the name 'port'"),
+    ],
+)
+def test_a_joint_or_a_name_is_told_once(
+    tmp_path: Path, fin: str, actuators: tuple[str, ...], said: str
+) -> None:
+    """Of two commands one would be lost."""
+    path = vehicle(tmp_path)
+    named = THRUSTERS.replace('<joint name="fin"', f'<joint name="{fin}"')
+    (tmp_path / "hull.xml").write_text(named.replace('joint="fin"', f'joint="{fin}"'))
+    control = f'[[control]]\njoints = ["{fin}"]\nstrength = 60.0\n[[objectives]]\nkind = "effort"\n'
+    path.write_text(path.read_text() + control)
+    with pytest.raises(fb.SceneError, match=said):
+        SceneEnv(path, joints=(fin,), actuators=actuators)
+
+
 def test_an_actuator_without_a_range_is_no_action(tmp_path: Path) -> None:
     path = vehicle(tmp_path)
     (tmp_path / "hull.xml").write_text(THRUSTERS.replace(' ctrlrange="-.5 .5"', ""))

@@ -108,6 +108,7 @@ def test_every_kind_of_stop_is_measured() -> None:
     assert found["tendon 'cord'"].amount == pytest.approx(length - 1.0)
     assert found["joint 'slide'"].allowed == pytest.approx(0.005)
     assert found["joint 'hinge'"].allowed == pytest.approx(np.radians(1.0))
+    assert found["tendon 'cord'"].allowed == pytest.approx(0.02 + np.radians(1.0))
     assert not list(passed_stops(model, model.rest().q))
 
 

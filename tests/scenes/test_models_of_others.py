@@ -168,6 +168,26 @@ def test_what_the_file_itself_switches_off_is_said(written: Written) -> None:
     assert not any("<flag>" in note for note in notes_of(scene, build(scene).world.setup.solid))
 
 
+def test_what_a_keyframe_has_besides_positions_is_said(written: Written) -> None:
+    key = {'<key_name="bent"': '<key name="bent" ctrl="0.3 0"'}
+    for given, named, told in ((key, "", False), ({}, "bent", False), (key, "bent", True)):
+        path = written(**given)
+        if named:
+            text = path.read_text().replace("[initial.positions]", '[initial]\nkeyframe = "bent"')
+            path.write_text(text)
+        scene = load_scene(path)
+        notes = " ".join(notes_of(scene, build(scene).world.setup.solid))
+        assert ("controls of keyframe 'bent'" in notes) == told
+
+
+def test_switches_of_actuators_and_sensors_have_no_effect_and_it_is_said(written: Written) -> None:
+    """Environments and scripts tell actuators that the file switches off."""
+    flags = {'gravity="disable"': 'actuation="disable" clampctrl="disable" sensor="disable"'}
+    scene = load_scene(written(**flags, **{'density="1000">': 'actuatorgroupdisable="2">'}))
+    said = next(notes_of(scene, build(scene).world.setup.solid))
+    assert "actuatorgroupdisable, actuation disabled, clampctrl disabled, sensor disabled" in said
+
+
 def test_a_frame_has_steps_that_keep_contact_with_the_floor_stiff(written: Written) -> None:
     """Half of the time constant of 20 ms in frames of 40 ms."""
     assert load_scene(written()).time.steps_per_frame == 4

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from flowborne.scenes.build import build
@@ -46,3 +48,19 @@ def test_a_film_without_the_dye_is_told() -> None:
         scene = load_scene("ns-block-drag-max", {"film.field": field})
         notes = " ".join(notes_of(scene, build(scene).world.setup.solid))
         assert ('[[dye]]: the film shows vorticity; [film] field = "dye"' in notes) == told
+
+
+@pytest.mark.parametrize(("solref", "steps"), [("0.02", 4), ("0.0002", 334)])
+def test_steps_that_contacts_ask_for_are_told(tmp_path: Path, solref: str, steps: int) -> None:
+    """A stiff floor makes a frame of hundreds of steps, which nobody would wait for unasked."""
+    ball = f'<freejoint/><geom size=".1" solref="{solref} 1" solmix="1e6"/>'
+    floor = '<geom name="floor" type="plane" size="1 1 1"/>'
+    (tmp_path / "ball.xml").write_text(
+        f'<mujoco><worldbody>{floor}<body pos="0 0 1">{ball}</body></worldbody></mujoco>'
+    )
+    path = tmp_path / "ball.toml"
+    path.write_text('[time]\nframes_per_second = 30\nframes = 2\n[solids]\nmodel = "ball.xml"\n')
+    for given in ({}, {"time.steps_per_frame": "1"}):
+        scene = load_scene(path, given)
+        notes = " ".join(notes_of(scene, build(scene).world.setup.solid))
+        assert (f"[time]: a frame has {steps} steps, as contacts" in notes) == (not given)

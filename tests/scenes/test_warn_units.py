@@ -82,6 +82,9 @@ def test_a_sound_scene_without_a_fluid_has_no_warning(swung: Swung) -> None:
 IN_MILLIMETRES = {'size="0.05 0.05 0.2" pos="0 0 -0.2"': 'size="50 50 200" pos="0 0 -200"'}
 
 
+IN_CENTIMETRES = {"<compiler": '<option gravity="0 0 -981"/><compiler'}
+
+
 WIND = '[[wind]]\nkind = "faces"\nvelocity = [144.0, 0.0, 0.0]\n'
 INERTIAL = '<inertial pos="0 0 0" mass="1" diaginertia="{0} {0} {0}"/>'
 
@@ -93,7 +96,9 @@ INERTIAL = '<inertial pos="0 0 0" mass="1" diaginertia="{0} {0} {0}"/>'
         ({"density = 500.0": "density = 0.5"}, "that of foam is 10; water has 1000 kg/m^3"),
         ({"density = 500.0": "density = 5e5"}, "that of osmium is 22600; water has 1000 kg/m^3"),
         ({"-9.81": "9.81"}, "gravity: it points up; -9.81 m/s^2 along z points down"),
+        ({"-9.81": "-981.0"}, "gravity: 981 m/s^2, and the Sun has 274; 981 cm/s^2 are 9.81 m"),
         ({"-9.81": "-9810.0"}, "gravity: 9810 m/s^2, and the Sun has 274; 9810 mm/s^2 are 9.81 m"),
+        (IN_CENTIMETRES, "arm.xml has a gravity of 981, the Earth's in cm/s^2, so its size"),
         ({"[initial]": WIND + "[initial]"}, "[[wind]] 1: 144 m/s, and the strongest gust"),
         ({"<geom": f"{INERTIAL.format(1000)}<geom"}, "the <inertial> of arm has its mass 31.6 m"),
         ({'angle="degree"': 'angle="radian"'}, "the range of hinge ends 14.3 turns away; 90 rad"),
@@ -104,6 +109,11 @@ def test_numbers_in_another_unit(swung: Swung, new: dict[str, str], expected: st
     warnings = [w for w in said(swung(new)) if "[time]" not in w]
     assert len(warnings) == 1
     assert expected in warnings[0]
+
+
+def test_a_scene_in_the_centimetres_of_its_model_is_in_no_other_unit(swung: Swung) -> None:
+    warnings = said(swung(IN_CENTIMETRES | {"0, -9.81]": "0, -981.0]"}))
+    assert not any("arm.xml has a gravity" in warning for warning in warnings)
 
 
 def test_a_grain_in_kilometres(swung: Swung) -> None:

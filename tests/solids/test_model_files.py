@@ -260,3 +260,22 @@ def test_a_muscle_without_range_is_explained_with_remedies_that_work(tmp_path: P
         compiled(given())
     assert compiled(given(joint='range="-60 60"')).nu == 1
     assert compiled(given(muscle='lengthrange="-1 1"')).nu == 1
+
+
+WRAPPED = """<mujoco><worldbody><site name="hook" pos="-.15 0 0"/><site name="side" pos="0 -.15 0"/>
+  <body><joint name="shoulder" axis="0 0 1" range="0 120" damping="0.1"/>
+    <geom type="capsule" size=".045" fromto="0 0 0 .5 0 0"/>
+    <geom name="pulley" type="cylinder" size=".1 .05" mass="0"/>
+    <site name="hand" pos="0.15 -0.06 0"/></body></worldbody>
+  <tendon><spatial name="cord"><site site="hook"/><geom geom="pulley" sidesite="side"/>
+  <site site="hand"/></spatial></tendon>
+  <actuator><muscle name="extensor" tendon="cord" {more}/></actuator></mujoco>"""
+
+
+def test_a_muscle_that_slips_off_its_pulley_is_explained(tmp_path: Path) -> None:
+    """Its joint has a range, at the end of which the tendon jumps: a lengthrange alone mends it."""
+    said = r"'extensor' is a muscle, .* it did not \(Lengthrange .*\).* where a tendon slips off"
+    with pytest.raises(ValueError, match=said):
+        compiled(written(tmp_path, {"arm.xml": WRAPPED.format(more="")}))
+    more = 'lengthrange="0.34 0.54"'
+    assert compiled(written(tmp_path, {"arm.xml": WRAPPED.format(more=more)})).nu == 1

@@ -44,6 +44,11 @@ def read_source(path: Path) -> Source:
     raises  SceneError when it is missing, of another format, or cannot be read
     """
     ending = path.suffix.lower()
+    if ending in (".xml", ".mjcf", ".urdf"):
+        raise SceneError(
+            f"{path.name} is a model, which needs no import. Write a scene with model = "
+            f'"{path.name}" under [solids].'
+        )
     if ending not in FORMATS:
         raise SceneError(
             f"{path.name} is none of {', '.join(FORMATS)}. Export the character in one of these "

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, is_dataclass, replace
 from typing import Any
@@ -16,7 +15,7 @@ from flowborne.kernels.arrays import Array, Integers
 from flowborne.solids.actuators import ActuatorServo, actuator_servos, unusable_actuator
 from flowborne.solids.force import Force, check_force
 from flowborne.solids.model import BALL, FREE, SLIDE, SolidModel, joint_kind
-from flowborne.solids.motors import Controls, control_range, driven_by, inputs_of
+from flowborne.solids.motors import Controls, control_range, driven_by, inputs_of, joint_of
 from flowborne.solids.trajectories import (
     Servo,
     ServoExact,
@@ -74,8 +73,8 @@ class Control:
 
     On a hinge or slide a position actuator is a critically damped servo of its stiffness, and a
     velocity actuator an exact one, each with the actuator's largest force. All others, such as
-    motors, muscles, and those on sites and tendons, exert MuJoCo's force. An actuator acts in
-    frames in which it has a control.
+    motors, muscles, those on sites and tendons, and those with more force to one side, exert
+    MuJoCo's force. An actuator acts in frames in which it has a control.
 
     value  several numbers for an actuator with several controls
     """
@@ -128,6 +127,12 @@ def told_by(
             number, values, said = _controlled(model, name, given)
             beyond += said
             controls.values[inputs_of(model, number)] = values
+            joint = joint_of(model, number) or ""
+            if isinstance(commands.get(joint), Position | Velocity | Torque):
+                raise SceneError(
+                    f"actuator '{name}' drives joint '{joint}', which has a command of its own as "
+                    "well: give one of the two"
+                )
             if name not in as_servo:
                 controls.told[number] = True
                 pushed.append(freed := driven_by(model, number))
@@ -139,8 +144,7 @@ def told_by(
         servo = servo_of(dofs, drives) if own is None else own
         if isinstance(command, Torque):
             wanted = _numbers(joint, command.value, dofs.size)
-            limit = torque_limit(model, joint, servo)
-            torque = np.clip(wanted, -limit, limit)
+            torque = np.clip(wanted, *torque_limits(model, joint, servo))
             beyond += _said(joint, wanted, torque, "N m or N")
             pushed.append(dofs)
             force.append(torque)
@@ -183,16 +187,17 @@ def _sole_servos(model: SolidModel, commands: Commands) -> dict[str, ActuatorSer
     return {
         model.actuator_names[servo.number]: servo
         for servo in actuator_servos(model)
-        if servo.number in numbers and dofs.count(int(model.dofs_of(servo.joint)[0])) == 1
+        if servo.number in numbers and servo.even
+        if dofs.count(int(model.dofs_of(servo.joint)[0])) == 1
     }
 
 
 def _as_servo(actuator: ActuatorServo, u: float) -> tuple[str, Command, Servo]:
     """Joint, command and servo that the control of a position or velocity actuator means."""
-    wanted, limit = actuator.wanted(u), actuator.limit or math.inf
+    wanted = actuator.wanted(u)
     if actuator.kind == "velocity":
-        return actuator.joint, Velocity(wanted), ServoExact(limit)
-    return actuator.joint, Position(wanted), ServoPD(actuator.frequency, limit)
+        return actuator.joint, Velocity(wanted), ServoExact(actuator.limit)
+    return actuator.joint, Position(wanted), ServoPD(actuator.frequency, actuator.limit)
 
 
 def _knots(
@@ -278,13 +283,14 @@ def servo_of(dofs: Integers, drives: Drives) -> Servo:
     return ServoExact()
 
 
-def torque_limit(model: SolidModel, joint: str, servo: Servo) -> Array:
-    """(k,) or (): largest torque on a joint, N m or N, by its servo and the model's
+def torque_limits(model: SolidModel, joint: str, servo: Servo) -> tuple[Array, Array]:
+    """(k,) or (): least and largest torque on a joint, N m or N, by its servo and the model's
     actuatorfrcrange."""
     number, limit = model.joint(joint), np.asarray(servo.torque_limit, dtype=np.float64)
-    if model.mj.jnt_actfrclimited[number]:
-        limit = np.minimum(limit, np.abs(model.mj.jnt_actfrcrange[number]).min())
-    return np.asarray(limit)
+    if not model.mj.jnt_actfrclimited[number]:
+        return -limit, limit
+    least, most = model.mj.jnt_actfrcrange[number]
+    return np.maximum(-limit, least), np.minimum(limit, most)
 
 
 def _said(joint: str, wanted: Array, given: Array, unit: str) -> list[str]:

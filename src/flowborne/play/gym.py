@@ -29,7 +29,7 @@ from flowborne.control.commands import (
     Torque,
     Velocity,
     servo_of,
-    torque_limit,
+    torque_limits,
 )
 from flowborne.control.measurement import Measurement
 from flowborne.kernels.arrays import Array
@@ -41,7 +41,7 @@ from flowborne.sim.frame import FrameReport
 from flowborne.sim.simulation import BlowUpError, Simulation
 from flowborne.solids.geoms import quaternion_of
 from flowborne.solids.model import SLIDE
-from flowborne.solids.motors import control_range
+from flowborne.solids.motors import control_range, joint_of
 from flowborne.solids.sensed import BodyState
 from flowborne.solids.sensors import sensor_columns
 
@@ -120,6 +120,7 @@ class SceneEnv(gymnasium.Env):  # type: ignore[name-defined]
         self._thrusters = {thruster.name: thruster.limits for thruster in ranged}
         self._actuators = self._told_actuators(joints, actuators)
         self._joints = self._told(joints)
+        self._check_told_once()
         self._kind, self._every, self.render_mode = kind, every, render_mode
         controlled = self.simulation.controller is not None
         if reward is None and not (controlled or self._thrusters):
@@ -209,6 +210,22 @@ class SceneEnv(gymnasium.Env):  # type: ignore[name-defined]
                 raise SceneError(f"scene {self.scene.name}: no actuator '{name}' in the model{end}")
         return tuple(named)
 
+    def _check_told_once(self) -> None:
+        """Raise SceneError where two numbers of an action would tell the same joint or name."""
+        model, told = self.simulation.setup.solid, [*self._joints, *self._actuators]
+        for name in told:
+            if told.count(name) > 1:
+                raise SceneError(
+                    f"scene {self.scene.name}: the policy tells two of the name '{name}'. Give it "
+                    "one of them, or another name in the model."
+                )
+        for name in self._actuators:
+            if (joint := joint_of(model, model.actuator(name))) in self._joints:
+                raise SceneError(
+                    f"scene {self.scene.name}: actuator '{name}' drives joint '{joint}', which is "
+                    "among the joints of the policy. Keep one of the two."
+                )
+
     def _limits(self) -> tuple[Array, Array]:
         """(n,) what -1 and 1 mean."""
         setup, controller = self.simulation.setup, self.simulation.controller
@@ -224,8 +241,7 @@ class SceneEnv(gymnasium.Env):  # type: ignore[name-defined]
                 low, high = model.dof_range[dofs].T
             else:
                 servo = servo_of(dofs, [(controller.dofs, controller.servo)])
-                high = np.broadcast_to(torque_limit(model, joint, servo), dofs.shape)
-                low = -high
+                low, high = np.broadcast_arrays(*torque_limits(model, joint, servo), dofs)[:2]
             if not (np.isfinite(low).all() and np.isfinite(high).all()):
                 key = "range" if self._kind == "position" else "actuatorfrcrange"
                 raise SceneError(

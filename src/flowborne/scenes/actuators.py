@@ -69,7 +69,8 @@ def scene_controls(
     tables: Sequence[ActuatorTable], model: SolidModel, constants: Mapping[str, float]
 ) -> Callable[[float, float], dict[str, Control]]:
     """Gives the controls by actuator of a frame that starts at a time (s) and takes a span (s)."""
-    at_end = {servo.number for servo in actuator_servos(model) if servo.kind == "position"}
+    servos = (servo for servo in actuator_servos(model) if servo.even)
+    at_end = {servo.number for servo in servos if servo.kind == "position"}
     parts = [
         (table.name, table.control(constants), 1.0 if model.actuator(table.name) in at_end else 0.5)
         for table in tables

@@ -255,12 +255,16 @@ def with_steps(scene: Scene) -> Scene:
     """
     if "steps_per_frame" in scene.time.model_fields_set or scene.model_path is None:
         return scene
-    longest = longest_step(load_model(scene))
-    steps = max(1, math.ceil(scene.frame_time / longest * (1.0 - 1e-9)))
+    steps = steps_of_contacts(scene, load_model(scene))
     if steps == scene.time.steps_per_frame:
         return scene
     time = scene.time.model_copy(update={"steps_per_frame": steps})
     return scene.model_copy(update={"time": time})
+
+
+def steps_of_contacts(scene: Scene, model: SolidModel) -> int:
+    """Fewest steps in a frame of the scene with which contacts with floors are stiff."""
+    return max(1, math.ceil(scene.frame_time / longest_step(model) * (1.0 - 1e-9)))
 
 
 def longest_step(model: SolidModel) -> float:
@@ -366,7 +370,7 @@ def held(
     if scene.solids is not None and scene.solids.hold is True:
         hold = tuple(undriven(scene, model, motions))
     servos: dict[str, Servo] = {
-        a.joint: ServoPD(a.frequency, a.limit or math.inf)
+        a.joint: ServoPD(a.frequency, a.limit)
         for a in actuator_servos(model)
         if a.kind == "position"
     }

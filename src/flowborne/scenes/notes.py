@@ -26,6 +26,7 @@ from flowborne.scenes.bodies import (
     own_pose,
     posed,
     spec_of,
+    steps_of_contacts,
     trajectories_of,
 )
 from flowborne.scenes.capture import capture_of
@@ -61,6 +62,12 @@ def notes_of(scene: Scene, model: SolidModel) -> Iterator[str]:
     yield from _creeping(scene)
     if scene.dye and scene.film.field != "dye":
         yield (f'[[dye]]: the film shows {scene.film.field}; [film] field = "dye" shows the dye')
+    steps = scene.time.steps_per_frame
+    if steps > 1 and steps == steps_of_contacts(scene, model):
+        yield (
+            f"[time]: a frame has {steps} steps, as contacts of the model with its floor are as "
+            "stiff as that (solref); time.steps_per_frame gives another number"
+        )
 
 
 def _creeping(scene: Scene) -> Iterator[str]:
@@ -179,6 +186,11 @@ def _elements(scene: Scene, spec: MjSpec, model: SolidModel) -> Iterator[str]:
     keys = [key.name or f"keyframe {n}" for n, key in enumerate(spec.keys)]
     if keys and scene.initial.keyframe is None:
         yield f"keyframes {listed(keys)}, of which [initial] keyframe takes one"
+    for key in spec.keys:
+        parts = ("ctrl", "controls"), ("mpos", "mocap positions"), ("mquat", "mocap orientations")
+        unused = [words for part, words in parts if len(getattr(key, part))]
+        if unused and key.name == scene.initial.keyframe:
+            yield f"{listed(unused)} of keyframe '{key.name}'"
     assert scene.solids is not None
     hold, told = scene.solids.hold, scene.told_actuators()
     servos = {

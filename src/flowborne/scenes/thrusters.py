@@ -161,8 +161,7 @@ def check_thrusters(
     places: Places, tables: Sequence[ThrusterTable], coupling: str, around: Surroundings
 ) -> Iterator[str]:
     """Thrusters against the model and each other, and the fluid that they need."""
-    mj = around.model.mj
-    used = {mj.actuator(n).name: "an actuator of the model" for n in range(mj.nu)}
+    used = dict.fromkeys(around.model.actuator_names, "an actuator of the model")
     for index, table in enumerate(tables):
         where, name = places.at("thruster", index), table.named(index + 1)
         yield from (f"{where}: {problem}" for problem in table.check(around))

@@ -43,6 +43,7 @@ from flowborne.scenes.warn_units import (
     densities_alone,
     gravity,
     inertias,
+    model_in_centimetres,
     ranges,
     sizes,
     slow_steps,
@@ -176,6 +177,7 @@ Warn = Callable[[Scene, Setup], Iterator[str]]
 WARNINGS: tuple[Warn, ...] = (
     sizes,
     gravity,
+    model_in_centimetres,
     winds,
     densities_alone,
     inertias,

@@ -12,7 +12,7 @@ from flowborne.base.phrases import and_more, listed
 from flowborne.base.tables import MOST_STEPS
 from flowborne.coupling.world import Setup
 from flowborne.kernels.arrays import Array, Integers
-from flowborne.scenes.bodies import initial_state
+from flowborne.scenes.bodies import initial_state, spec_of
 from flowborne.scenes.capture import capture_of
 from flowborne.scenes.creature import creature_extent
 from flowborne.scenes.schema import Scene
@@ -32,6 +32,9 @@ SMALLEST_PERSON, HEAVIEST_PERSON = 1.0, 635.0
 
 STRONGEST_GRAVITY = 274.0
 """m/s^2 on the Sun. On the Earth it is 9810 mm/s^2."""
+
+CENTIMETRES = 970.0, 990.0
+"""cm/s^2, about gravity on the Earth (978 to 983)."""
 
 STRONGEST_WIND = 113.0
 """m/s, the strongest gust on record (WMO: Barrow Island, 1996). That is 408 km/h."""
@@ -101,16 +104,31 @@ def densities_alone(scene: Scene, setup: Setup) -> Iterator[str]:
 
 
 def gravity(scene: Scene, setup: Setup) -> Iterator[str]:
-    """Gravity in mm/s^2, and gravity that points up."""
+    """Gravity in cm/s^2 or mm/s^2, and gravity that points up."""
     if not scene.has_bodies:
         return
     strength, up = float(np.linalg.norm(scene.gravity)), scene.dimensions - 1
     if strength and scene.gravity[up] == strength:
         yield f"gravity: it points up; -{strength:g} m/s^2 along {'xyz'[up]} points down"
     if strength > STRONGEST_GRAVITY:
+        unit, factor = ("mm", 1e-3) if strength > CENTIMETRES[1] else ("cm", 1e-2)
         yield (
             f"gravity: {strength:g} m/s^2, and the Sun has {STRONGEST_GRAVITY:g}; "
-            f"{strength:g} mm/s^2 are {1e-3 * strength:g} m/s^2"
+            f"{strength:g} {unit}/s^2 are {factor * strength:g} m/s^2"
+        )
+
+
+def model_in_centimetres(scene: Scene, setup: Setup) -> Iterator[str]:
+    """A model whose own gravity is the Earth's in cm/s^2, in a scene with another one."""
+    if scene.model_path is None or scene.solids is None:
+        return
+    own, given = (float(np.linalg.norm(g)) for g in (spec_of(scene).option.gravity, scene.gravity))
+    if CENTIMETRES[0] < own < CENTIMETRES[1] and own != given:
+        yield (
+            f"[solids]: {scene.model_path.name} has a gravity of {own:g}, the Earth's in cm/s^2, "
+            "so its sizes are in cm and its masses in g; a scene all in cm, g and s fits it "
+            f"(gravity {own:g}, water of 1 g/cm^3 and 0.01 g/(cm s), air of 0.0012 and 0.00018), "
+            "and so are its results"
         )
 
 

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import Literal
 
 import mujoco
-import numpy as np
 
 from flowborne.solids.model import HINGE, SLIDE, SolidModel
 
@@ -26,7 +25,8 @@ class ActuatorServo:
                it at gain u, as a damper
     gain       rad or m, rad/s or m/s for each unit of u
     offset     what it does at u = 0, likewise
-    limit      largest torque or force, N m or N
+    limit      largest torque or force to either side, N m or N
+    even       whether it has no more to one side
     frequency  rad/s, sqrt(kp / M) of a position servo with the joint's inertia M at rest
     """
 
@@ -36,6 +36,7 @@ class ActuatorServo:
     gain: float
     offset: float
     limit: float
+    even: bool
     frequency: float
 
     def wanted(self, u: float) -> float:
@@ -45,7 +46,8 @@ class ActuatorServo:
 
 def actuator_servos(model: SolidModel) -> Iterator[ActuatorServo]:
     """Those of the model with the force gear (g u + b0 + b1 l + b2 v) on a hinge or slide, with l
-    and v gear times its position and velocity (MuJoCo's affine bias), and b1 < 0 or b2 < 0."""
+    and v gear times its position and velocity (MuJoCo's affine bias), b1 < 0 or b2 < 0, and forces
+    to both sides."""
     mj, plain, Bias = model.mj, mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias
     for a in range(mj.nactuator):
         on_joint = mj.actuator_trntype[a] == mujoco.mjtTrn.mjTRN_JOINT
@@ -64,12 +66,16 @@ def actuator_servos(model: SolidModel) -> Iterator[ActuatorServo]:
             frequency = math.sqrt(-b1 * gear * gear / mj.dof_M0[mj.jnt_dofadr[number]])
         elif b2 >= 0.0:
             continue
-        limit = math.inf
+        low, high = -math.inf, math.inf
         if mj.actuator_forcelimited[a]:
-            limit = abs(gear) * float(np.abs(mj.actuator_forcerange[a]).min())
-        yield ActuatorServo(
-            a, model.joint_names[number], kind, g / unit, b0 / unit, limit, frequency
-        )
+            low, high = sorted((gear * mj.actuator_forcerange[a]).tolist())
+        if mj.jnt_actfrclimited[number]:
+            least, most = mj.jnt_actfrcrange[number].tolist()
+            low, high = max(low, least), min(high, most)
+        if low < 0.0 < high:
+            force = min(-low, high), -low == high
+            joint = model.joint_names[number]
+            yield ActuatorServo(a, joint, kind, g / unit, b0 / unit, *force, frequency)
 
 
 def unusable_actuator(model: SolidModel, number: int) -> str | None:

@@ -169,9 +169,10 @@ def _refusal(spec: MjSpec, where: str, error: ValueError) -> ValueError:
     spec   of the model, not changed
     where  name of the model
     """
-    muscle = re.search(r"Lengthrange computation did not converge in actuator (\d+)", str(error))
+    muscle = re.search(r"(.*lengthrange.*) in actuator (\d+)", str(error), re.IGNORECASE)
     if muscle is not None:
-        return ValueError(f"{where}: {_without_range(spec.actuators[int(muscle[1])])}")
+        why = muscle[1].removeprefix("Error: ")
+        return ValueError(f"{where}: {_without_range(spec.actuators[int(muscle[2])], why)}")
     found = re.search(r"Error: (.*inertia.*?)\s*Element name '([^']*)'", str(error), re.DOTALL)
     if found is None:
         return _unreadable(where, error)
@@ -181,13 +182,13 @@ def _refusal(spec: MjSpec, where: str, error: ValueError) -> ValueError:
     )
 
 
-def _without_range(muscle: mujoco.MjsActuator) -> str:
-    """Sentences about a muscle whose length has no ends."""
+def _without_range(muscle: mujoco.MjsActuator, why: str) -> str:
+    """Sentences about a muscle whose length has no ends, or that does not come to rest there."""
     return (
         f"'{muscle.name}' is a muscle, whose force goes by its length between the shortest and the "
         f"longest. MuJoCo looks for these by pulling '{muscle.target}' both ways until it stops, "
-        "and nothing stops it. Give the joints or the tendon that it pulls a range, or the muscle "
-        'its own lengthrange="shortest longest".'
+        f"and it did not ({why}). Give the joints or the tendon that it pulls a range, or the "
+        'muscle its own lengthrange="shortest longest", as where a tendon slips off a geom.'
     )
 
 

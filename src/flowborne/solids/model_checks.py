@@ -69,6 +69,10 @@ MEDIUM = ("density", "viscosity", "wind")
 SWITCHES = ("constraint", "contact", "damper", "equality", "frictionloss", "limit", "spring")
 """MuJoCo's flags that switch parts of a model off, here as well."""
 
+IGNORED = ("gravity", "actuation", "clampctrl", "sensor")
+"""MuJoCo's flags that switch nothing off here: the scene has its gravity, an actuator acts where it
+has a control within its range, and sensors are always read."""
+
 
 def check_kind(root: Element, suffix: str) -> None:
     """Raise ValueError for a model in a language that MuJoCo does not read.
@@ -240,16 +244,21 @@ def replaced_options(
     changed += [key for key in MEDIUM if np.any(getattr(option, key) != getattr(default, key))]
     if option.noslip_iterations:
         changed.append("noslip_iterations")
-    if option.disableflags & mujoco.mjtDisableBit.mjDSBL_GRAVITY:
-        changed.append("gravity disabled")
+    if option.disableactuator:
+        changed.append("actuatorgroupdisable")
+    changed += [f"{flag} disabled" for flag in _disabled(option, IGNORED)]
     if changed:
         yield f"options {listed(changed)}"
 
 
 def disabled_parts(spec: mujoco.MjSpec) -> list[str]:
     """Those of SWITCHES that a model file switches off."""
-    flags, bits = spec.option.disableflags, mujoco.mjtDisableBit
-    return [name for name in SWITCHES if flags & getattr(bits, f"mjDSBL_{name.upper()}")]
+    return _disabled(spec.option, SWITCHES)
+
+
+def _disabled(option: mujoco.MjOption, flags: tuple[str, ...]) -> list[str]:
+    bits = mujoco.mjtDisableBit
+    return [f for f in flags if option.disableflags & getattr(bits, f"mjDSBL_{f.upper()}")]
 
 
 def bodies_with_own_inertia(spec: mujoco.MjSpec) -> list[str]:

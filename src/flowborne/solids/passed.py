@@ -13,10 +13,11 @@ from flowborne.solids.engine import row_jacobian
 from flowborne.solids.geoms import element_name
 from flowborne.solids.loops import active_equalities
 from flowborne.solids.model import BALL, SLIDE, SolidModel, turning_dofs
-from flowborne.solids.scratch import STOP_STEPS, posed, time_constant
+from flowborne.solids.momentum import tendon_jacobian
+from flowborne.solids.scratch import STOP_STEPS, posed, scratch, time_constant
 
 DEGREE = float(np.radians(1.0))
-"""rad that a joint may be beyond its range."""
+"""rad that a joint may be beyond its range, and of its joints that a tendon may."""
 
 SHARE = 0.01
 """Part of its range that a slide or a tendon may be beyond it; rad of its joints that an equality
@@ -67,12 +68,15 @@ def passed_stops(model: SolidModel, q: Array) -> Iterator[Passed]:
     if not mj.tendon_limited.any():
         return
     lengths = _placed(model, q).ten_length
+    turning = abs(tendon_jacobian(scratch(model)))[:, turning_dofs(model)].toarray()
+    by_a_degree = DEGREE * turning.max(axis=1, initial=0.0)
     for t in np.flatnonzero(mj.tendon_limited).tolist():
         (low, high), place = mj.tendon_range[t], float(lengths[t])
         amount = float(max(low - place, place - high))
         if amount > 0.0:
             name = f"tendon '{element_name(mj, mujoco.mjtObj.mjOBJ_TENDON, t)}'"
-            yield Passed(name, amount, SHARE * float(high - low), False, place)
+            allowed = SHARE * float(high - low) + float(by_a_degree[t])
+            yield Passed(name, amount, allowed, False, place)
 
 
 @dataclass
