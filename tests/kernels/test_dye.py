@@ -24,6 +24,9 @@ ROOM = (5, 4, 6)
 NEVER = -1e9, 1e9
 """Bounds that hold nothing."""
 
+ORDERS = [(0, 1, 2), (2, 1, 0), (2, 0, 1), (1, 0, 2), (0, 2, 1)]
+"""Of axes: those of a room and of a slab."""
+
 
 def flows(shape: tuple[int, int, int], random: np.random.Generator) -> list[np.ndarray]:
     """Random fluxes of which no more leaves a cell than it holds in a step of 1."""
@@ -31,10 +34,17 @@ def flows(shape: tuple[int, int, int], random: np.random.Generator) -> list[np.n
     return [random.uniform(-0.15, 0.15, size) for size in sizes]
 
 
+@pytest.mark.parametrize("order", ORDERS)
 @pytest.mark.parametrize("shape", SHAPES)
 @pytest.mark.parametrize("wraps", [False, True])
 @pytest.mark.parametrize("bounds", [NEVER, (0.2, 0.8)])
-def test_sweep(shape: tuple[int, int, int], wraps: bool, bounds: tuple[float, float]) -> None:
+def test_sweep(
+    order: tuple[int, int, int],
+    shape: tuple[int, int, int],
+    wraps: bool,
+    bounds: tuple[float, float],
+) -> None:
+    """In a box of larger arrays, along each axis."""
     random = np.random.default_rng(1)
     flux = random.uniform(-0.5, 0.5, (shape[0], shape[1] + 1, shape[2]))
     if wraps:
@@ -43,9 +53,14 @@ def test_sweep(shape: tuple[int, int, int], wraps: bool, bounds: tuple[float, fl
     ends = random.uniform(0.3, 0.7, (2, shape[0], shape[2]))
     clear = (random.random(shape) < 0.8).astype(np.uint8)
     expected = sweep_reference(field, volume, flux, clear, ends, wraps, 0.9, *bounds)
-    crossed = sweep(field, volume, flux, clear, ends, wraps, 0.9, bounds)
-    for given, value in zip((field, volume, crossed), expected, strict=True):
+    arrays = field, volume, flux, clear
+    around = [np.pad(a, 1).transpose(np.argsort(order)).copy() for a in arrays]
+    x, y, z = (1 + shape[order.index(axis)] for axis in range(3))
+    crossed = sweep(*around, ((1, 1, 1), (x, y, z)), order, ends, wraps, 0.9, bounds)
+    carried = [np.pad(a, 1).transpose(np.argsort(order)) for a in expected[:2]]
+    for given, value in zip((*around[:2], crossed), (*carried, expected[2]), strict=True):
         np.testing.assert_allclose(given, value, atol=1e-14)
+    assert len(sweep.outer.signatures) == 1, "compiled once for all axes"
 
 
 @pytest.mark.parametrize("courant", [0.1, 0.5, 0.9, -0.4])
@@ -56,7 +71,8 @@ def test_means_of_a_parabola_are_carried_exactly(courant: float) -> None:
     field = np.diff(whole).reshape(1, 12, 1)
     flux = np.full((1, 13, 1), courant)
     clear, ends = np.ones(field.shape, np.uint8), np.zeros((2, 1, 1))
-    sweep(field, np.ones(field.shape), flux, clear, ends, False, 1.0, NEVER)
+    box = (0, 0, 0), (1, 12, 1)
+    sweep(field, np.ones(field.shape), flux, clear, box, (0, 1, 2), ends, False, 1.0, NEVER)
     moved = x[3:10] - courant
     exact = np.diff(2.0 * moved + 3.0 * moved**2 + 0.1 * moved**3 / 3.0)
     np.testing.assert_allclose(field[0, 3:9, 0], exact, rtol=1e-13)

@@ -128,6 +128,46 @@ def test_ctrl_c_while_llvm_calls_python_interrupts_when_the_kernel_is_compiled()
     assert add(1.0) == 2.0
 
 
+@kernel
+def positive(x):
+    """x, which is to be positive."""
+    if x < 0.0:
+        raise ValueError("below 0:", x)
+    return x
+
+
+@kernel
+def both_positive(x, y):
+    """x + y."""
+    return positive(x) + positive(y)
+
+
+@kernel
+def sum_of_roots(x, y):
+    """The sum of two roots."""
+    return np.sqrt(both_positive(x, y))
+
+
+def test_a_chain_of_kernels_becomes_machine_code_once():
+    codegen, made = cpu_target.target_context.codegen(), []
+    library = codegen._library_class
+    codegen._engine.set_object_cache(
+        lambda module, code: made.append(module.name), library._object_getbuffer_hook
+    )
+    try:
+        jit.compiled(sum_of_roots.__wrapped__)(4.0, 5.0)
+    finally:
+        hooks = library._object_compiled_hook, library._object_getbuffer_hook
+        codegen._engine.set_object_cache(*hooks)
+    assert made == ["sum_of_roots"]
+
+
+def test_what_a_kernel_of_a_kernel_raises_has_its_values():
+    with pytest.raises(ValueError, match=r"below 0:.*-2\.0"):
+        sum_of_roots(1.0, -2.0)
+    assert sum_of_roots(4.0, 5.0) == 3.0
+
+
 def test_context_is_left_after_an_error():
     with pytest.raises(RuntimeError), kernel_threads():
         raise RuntimeError("stop")

@@ -14,15 +14,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flowborne.fluid.boundary import Boundaries, Source, cells_in
 from flowborne.fluid.control_volumes import WHOLE as UNCUT
-from flowborne.fluid.ghosts import Scalar, edge
+from flowborne.fluid.ghosts import edge
 from flowborne.fluid.grid import Grid, extent, inner_product
 from flowborne.fluid.sides.side import Place
 from flowborne.fluid.transport import SUBSTEPS, Transport, parts_for
-from flowborne.kernels.arrays import Array, Integers, Marks
+from flowborne.kernels.arrays import Array, Integers, Marks, Three
 from flowborne.kernels.control_volumes import mark_cut
 from flowborne.kernels.dye import (
     CUT,
@@ -160,17 +159,16 @@ class Passage:
         self, axis: int, name: str, fields: tuple[Array, Array], box: Box, bounds: Bounds
     ) -> float:
         """Carry a scalar along an axis in a box, in place, with the volumes; gives what came in."""
-        grid, own, faces, field = self.grid, box[axis], list(box), fields[0]
-        faces[axis] = slice(own.start, own.stop + 1)
-        flux, marks = self.transport.flux[axis][tuple(faces)], along(self.clear[box], axis, grid)
+        grid, own = self.grid, box[axis]
         within = own.start > 0, own.stop < grid.shape[axis]  # nothing comes in at such an end
         others = tuple(c for a, c in enumerate(box) if a != axis)[:: -1 if grid.is_slab else 1]
-        ends = np.stack([self.beyond(name, field, axis, upper)[others] for upper in (0, 1)])
+        ends = np.stack([self.beyond(name, fields[0], axis, upper)[others] for upper in (0, 1)])
         ends[np.array(within)] = 0.0
         ring = self.sides.periodic()[axis] and not any(within)
-        values, room = (along(f[box], axis, grid) for f in fields)
-        flow = along(flux, axis, grid)
-        crossed = sweep(values, room, flow, marks, ends, ring, self.dt, bounds)
+        flux, (x, y, z) = self.transport.flux[axis], box
+        corners = (x.start, y.start, z.start), (x.stop, y.stop, z.stop)
+        given = flux, self.clear, corners, order_along(axis, grid)
+        crossed = sweep(*fields, *given, ends, ring, self.dt, bounds)
         return float(crossed[0].sum() - crossed[1].sum())
 
     def bounds(self, name: str, values: Array) -> Bounds:
@@ -183,8 +181,8 @@ class Passage:
         return min(float(a.min()) for a in found), max(float(a.max()) for a in found)
 
     def beyond(self, name: str, field: Array, axis: int, upper: int) -> Array:
-        """Values that come in through a side across `axis`, in the order of `along`: what the side
-        prescribes, or those beside it."""
+        """Values that come in through a side across `axis`, in the order of `order_along`: what the
+        side prescribes, or those beside it."""
         place, time = Place(self.grid, axis, bool(upper)), self.transport.time + self.transport.dt
         if (name, axis, upper) not in self.given:
             prescribed = self.sides.pair(axis)[upper].entering_scalar(name, place, time)
@@ -214,8 +212,8 @@ class Passage:
         return pass_on(field, volume, cells, entering, gain, dye, local, bounds)
 
 
-def along(values: NDArray[Scalar], axis: int, grid: Grid) -> NDArray[Scalar]:
-    """View of a field with `axis` as its second one, and a slab's depth as the first."""
+def order_along(axis: int, grid: Grid) -> Three:
+    """The axes of a field with `axis` as the second one, and a slab's depth as the first."""
     if grid.is_slab:
-        return values.transpose(2, axis, 1 - axis)
-    return values.transpose([(1, 0, 2), (0, 1, 2), (0, 2, 1)][axis])
+        return 2, axis, 1 - axis
+    return ((1, 0, 2), (0, 1, 2), (0, 2, 1))[axis]

@@ -123,7 +123,9 @@ def list_cells(piece: Piece, listed: Mask) -> tuple[Integers, Array]:
                     continue
                 cell_wrench(wrench, i, j, k, piece)
                 if wrench.any():
-                    cells[at], values[at] = (i * n[1] + j) * n[2] + k, wrench
+                    cells[at] = (i * n[1] + j) * n[2] + k
+                    for m in range(6):
+                        values[at, m] = wrench[m]
                     at += 1
     return cells[:at], values[:at]
 

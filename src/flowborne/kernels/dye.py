@@ -101,28 +101,38 @@ def sweep(
     volume: Array,
     flux: Array,
     clear: Marks,
+    box: tuple[Three, Three],
+    order: Three,
     ends: Array,
     wraps: bool,
     dt: float,
     bounds: Bounds,
 ) -> Array:
-    """Carry a field along the second of its axes, in place; gives the amounts through both ends.
+    """Carry a field along the second of its axes in an order, in a box and in place; gives the
+    amounts through both ends of the box.
 
-    field   (m, n, l) values of the cells
-    volume  (m, n, l) of the cells, in place
-    flux    (m, n+1, l) volume per time through the faces
-    clear   (m, n, l) see `bend_row`
+    field   (nx, ny, nz) values of the cells
+    volume  (nx, ny, nz) of the cells, in place
+    flux    volume per time through the faces across the axis
+    clear   (nx, ny, nz) see `bend_row`
+    box     first cell along each axis, and that after the last; (m, n, l) cells in this order
     ends    (2, m, l) values beyond both sides, where the axis does not wrap
     bounds  of all values
     returns (2, m, l)
     """
-    (m, n, count), (least, most), crossed = field.shape, bounds, np.zeros(ends.shape)
+    (x, y, z), (x1, y1, z1) = box
+    faces = flux[x : x1 + (order[1] == 0), y : y1 + (order[1] == 1), z : z1 + (order[1] == 2)]
+    flows = faces.transpose(order)
+    values = field[x:x1, y:y1, z:z1].transpose(order)
+    volumes = volume[x:x1, y:y1, z:z1].transpose(order)
+    cleared = clear[x:x1, y:y1, z:z1].transpose(order)
+    (m, n, count), (least, most), crossed = values.shape, bounds, np.zeros(ends.shape)
     strips = (count + WIDTH - 1) // WIDTH
     for block in prange(m * strips):
         i, start = np.int64(block) // strips, (np.int64(block) % strips) * WIDTH
         w, strip = min(WIDTH, count - start), slice(start, start + WIDTH)
-        lines, room, through = field[i, :, strip], volume[i, :, strip], flux[i, :, strip]
-        marks, c = clear[i, :, strip], np.empty((n + 4, w))
+        lines, room, through = values[i, :, strip], volumes[i, :, strip], flows[i, :, strip]
+        marks, c = cleared[i, :, strip], np.empty((n + 4, w))
         v, free = np.ones((n + 2, w)), np.empty(w)
         for j in range(n):
             copy(c[j + 2], lines[j])

@@ -129,7 +129,8 @@ def add_crossing(
     n += int(upper)
     if part < found.part[n]:
         found.part[n], found.piece[n] = part, piece
-        found.normal[n] = normal
+        for m in range(3):
+            found.normal[n, m] = normal[m]
 
 
 @kernel

@@ -35,6 +35,8 @@ import numpy as np
 from numba import njit
 from numba.core import event
 
+from flowborne.kernels.linking import KernelCompiler
+
 P = ParamSpec("P")
 R = TypeVar("R")
 
@@ -146,7 +148,8 @@ def numba_threads(count: int) -> Iterator[bool]:
 def compiled(function: FunctionType, **options: Any) -> Any:
     """By Numba when first called. A division by 0 gives what IEEE says: loops that stop at one are
     not vectorised. There is no entry for C."""
-    return njit(nogil=True, error_model="numpy", no_cfunc_wrapper=True, **options)(function)
+    options |= {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+    return njit(pipeline_class=KernelCompiler, **options)(function)
 
 
 class Kernel(Generic[P, R]):
