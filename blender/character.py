@@ -15,7 +15,7 @@ import numpy as np
 
 from .motion import Array
 from .reaction import Reaction, ReactionError, Vector
-from .stand_in import parents_of, play, remove, stand_in
+from .stand_in import parents_of, play, stand_in
 
 TRACK = "flowborne"
 """Start of the names of our NLA tracks."""
@@ -272,9 +272,8 @@ def export_character(context: Any, armature: Any, path: Path, first: int, last: 
     frames, bones = range(first, last + 1), parents_of(armature.data.bones)
     with _without_bakes(armature):
         places, poses = poses_of(context, armature, frames, bones)
-    scene, render = bpy.data.scenes.new(TRACK), context.scene.render
-    try:
-        copy = stand_in(context, scene, armature, meshes, armature.name)
+    render = context.scene.render
+    with stand_in(context, armature, meshes, armature.name) as (copy, scene):
         play(copy, range(len(frames)), {name: places @ pose for name, pose in poses.items()})
         scene.frame_start, scene.frame_end = 0, last - first
         # Times of the file are in seconds, but the exporter multiplies by the base of the rate.
@@ -299,9 +298,6 @@ def export_character(context: Any, armature: Any, path: Path, first: int, last: 
                 export_cameras=False,
                 export_lights=False,
             )
-    finally:
-        remove(scene.objects)
-        bpy.data.scenes.remove(scene)
 
 
 @contextmanager

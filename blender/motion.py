@@ -88,14 +88,14 @@ class Motion:
         return max((float(angles(*pair)) for pair in ends), default=0.0)
 
 
-def read_motion(run: Path) -> Motion:
-    """The motion of a run, complete or not.
+def read_motion(run: Path, start: int = 0) -> Motion:
+    """The motion of a run, complete or not, from a frame on.
 
     raises  MotionError when there is no frame, or a file cannot be read
     """
     try:
         model: dict[str, Any] = json.loads((run / "model.json").read_text(encoding="utf-8"))
-        states = [_read(path) for path in sorted((run / "states").glob("[0-9]*.npz"))]
+        states = [_read(path) for path in sorted((run / "states").glob("[0-9]*.npz"))[start:]]
         if not states:
             raise ValueError("it has no states")
         position, rotation = (np.array(values, np.float64) for values in zip(*states, strict=True))

@@ -14,6 +14,7 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, St
 from .bake import bake, turned_away
 from .character import armature_of, control_of, selected_bones
 from .environment import Install, engine_command
+from .ghost import remove_ghosts, show_ghost
 from .job import Job
 from .jobs import (
     ERRORS,
@@ -49,8 +50,8 @@ class _Watch:
 
     report: Callable[..., None]
 
-    def _watch(self, context: Any, job: Job | Install) -> set[str]:
-        manager, self._job = context.window_manager, job
+    def _watch(self, context: Any, job: Job | Install, armature: str = "") -> set[str]:
+        manager, self._job, self._armature = context.window_manager, job, armature
         self._timer = manager.event_timer_add(PERIOD, window=context.window)
         manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
@@ -64,8 +65,13 @@ class _Watch:
         job.step()
         for area in context.screen.areas if context.screen else ():
             area.tag_redraw()
+        armature = bpy.data.objects.get(self._armature)
+        if job.state is State.RUNNING and isinstance(job, Job) and armature is not None:
+            show_ghost(context, armature, job)
         if job.active:
             return {"PASS_THROUGH"}
+        if isinstance(job, Job):
+            remove_ghosts(job)
         context.window_manager.event_timer_remove(self._timer)
         if isinstance(job, Install) and job.state is State.DONE:
             preferences_of(context).engine = str(job.folder)
@@ -103,7 +109,7 @@ class FlowborneRun(_Watch, bpy.types.Operator):
                 job.start()
             else:
                 job = start_job(context, engine_of(context), self.only_check)
-            return self._watch(context, job)
+            return self._watch(context, job, armature_of(context).name)
         return {"CANCELLED"}
 
 

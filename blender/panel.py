@@ -10,6 +10,7 @@ from bpy.props import PointerProperty, StringProperty
 
 from .character import armature_of
 from .environment import Install
+from .ghost import remove_stale
 from .job import Job
 from .jobs import ERRORS, JOBS, engine_of, folders_of, install_of, job_in, job_of
 from .operators import (
@@ -172,6 +173,8 @@ def register() -> None:
     for each in CLASSES:
         bpy.utils.register_class(each)
     bpy.types.Object.flowborne = PointerProperty(type=FlowborneSettings)
+    for handlers in (bpy.app.handlers.undo_post, bpy.app.handlers.redo_post):
+        handlers.append(remove_stale)
 
 
 def unregister() -> None:
@@ -179,6 +182,9 @@ def unregister() -> None:
     for job in JOBS.values():
         job.close()
     JOBS.clear()
+    remove_stale()
+    for handlers in (bpy.app.handlers.undo_post, bpy.app.handlers.redo_post):
+        handlers.remove(remove_stale)
     del bpy.types.Object.flowborne
     for each in reversed(CLASSES):
         bpy.utils.unregister_class(each)
