@@ -65,9 +65,9 @@ class _Watch:
         job.step()
         for area in context.screen.areas if context.screen else ():
             area.tag_redraw()
-        armature = bpy.data.objects.get(self._armature)
-        if job.state is State.RUNNING and isinstance(job, Job) and armature is not None:
-            show_ghost(context, armature, job)
+        if isinstance(job, Job) and job.state is State.RUNNING:
+            if armature := bpy.data.objects.get(self._armature):
+                show_ghost(context, armature, job)
         if job.active:
             return {"PASS_THROUGH"}
         if isinstance(job, Job):
