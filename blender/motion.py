@@ -19,6 +19,10 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 
+STATE = ("body_position", "body_rotation", "fluid_centre", "fluid_force")
+"""Arrays of a state, in the order of the fields of `Motion`."""
+
+
 class MotionError(Exception):
     """A run cannot be baked; the text says why and what to do."""
 
@@ -31,12 +35,16 @@ class Motion:
     moving    names of those that have a joint, the root first; others are rigid with their parent
     position  (frames, n, 3) m
     rotation  (frames, n, 3, 3) from the axes of the bone to the world's
+    centre    (frames, n, 3) m, of the mass of the body
+    force     (frames, n, 3) N, of air or water on it
     """
 
     names: tuple[str, ...]
     moving: tuple[str, ...]
     position: Array
     rotation: Array
+    centre: Array
+    force: Array
 
     def of(self, bone: str) -> tuple[Array, Array]:
         """(frames, 3) m and (frames, 3, 3) of a bone."""
@@ -73,13 +81,16 @@ class Motion:
                 f"the run has {len(self.position) - 1} frames, and the bake starts after {lead}: "
                 "resume the run"
             )
-        position, rotation = self.position[lead:], self.rotation[lead:]
-        if loop:
-            start, turned = self.of(self.moving[0])
-            back = turned[0] @ turned[lead].T
-            position = (position - start[lead]) @ back.T + start[0]
-            rotation = back @ rotation
-        return replace(self, position=position, rotation=rotation)
+        start, turned = self.of(self.moving[0])
+        back = turned[0] @ turned[lead].T if loop else np.eye(3)
+        begin, end = (start[lead], start[0]) if loop else (0.0, 0.0)
+        return replace(
+            self,
+            position=(self.position[lead:] - begin) @ back.T + end,
+            rotation=back @ self.rotation[lead:],
+            centre=(self.centre[lead:] - begin) @ back.T + end,
+            force=self.force[lead:] @ back.T,
+        )
 
     def ends_apart(self, bones: Iterable[str]) -> float:
         """Largest rotation of bones, relative to the root, from first to last frame, degrees."""
@@ -98,15 +109,15 @@ def read_motion(run: Path, start: int = 0) -> Motion:
         states = [_read(path) for path in sorted((run / "states").glob("[0-9]*.npz"))[start:]]
         if not states:
             raise ValueError("it has no states")
-        position, rotation = (np.array(values, np.float64) for values in zip(*states, strict=True))
-        return Motion(tuple(model["bodies"]), tuple(model["joints"]), position, rotation)
+        arrays = (np.array(values, np.float64) for values in zip(*states, strict=True))
+        return Motion(tuple(model["bodies"]), tuple(model["joints"]), *arrays)
     except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
         raise MotionError(f"{run} has no frames to bake ({error}): resume the run") from error
 
 
-def _read(path: Path) -> tuple[Array, Array]:
+def _read(path: Path) -> list[Array]:
     with np.load(path) as state:
-        return state["body_position"], state["body_rotation"]
+        return [state[name] for name in STATE]
 
 
 def angles(one: Array, other: Array) -> Array:

@@ -14,6 +14,7 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, St
 from .bake import bake, turned_away
 from .character import armature_of, control_of, selected_bones
 from .environment import Install, engine_command
+from .forces import add_forces
 from .ghost import remove_ghosts, show_ghost
 from .job import Job
 from .jobs import (
@@ -27,7 +28,7 @@ from .jobs import (
     start_install,
     start_job,
 )
-from .motion import read_motion
+from .motion import Motion, read_motion
 from .presets import PRESETS, named_in, preset
 from .process import State
 from .reaction import ReactionError
@@ -65,9 +66,9 @@ class _Watch:
         job.step()
         for area in context.screen.areas if context.screen else ():
             area.tag_redraw()
-        if isinstance(job, Job) and job.state is State.RUNNING:
-            if armature := bpy.data.objects.get(self._armature):
-                show_ghost(context, armature, job)
+        things = bpy.data.objects
+        if isinstance(job, Job) and job.state is State.RUNNING and self._armature in things:
+            show_ghost(context, things[self._armature], job)
         if job.active:
             return {"PASS_THROUGH"}
         if isinstance(job, Job):
@@ -127,6 +128,28 @@ class FlowborneCancel(bpy.types.Operator):
         return {"FINISHED"}
 
 
+def _result(context: Any) -> tuple[Any, Job, Motion]:
+    """The active armature, its last job, and what it gives. Raises one of ERRORS."""
+    armature = armature_of(context)
+    job = job_of(armature.flowborne, engine_of(context))
+    return armature, job, read_motion(job.run).after(job.reaction.lead, job.reaction.loop)
+
+
+class FlowborneForces(bpy.types.Operator):
+    """Add the forces on the bodies as points with attributes, and arrows by geometry nodes"""
+
+    bl_idname = "flowborne.forces"
+    bl_label = "Show Forces"
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012 - Blender's way
+
+    def execute(self, context: Any) -> set[str]:
+        with _reported(self):
+            armature, job, motion = _result(context)
+            add_forces(context, armature, motion, job.reaction.first, job.reaction.unit)
+            return {"FINISHED"}
+        return {"CANCELLED"}
+
+
 class FlowborneBake(bpy.types.Operator):
     """Put the frames so far on the NLA, as a strip above the animation"""
 
@@ -151,10 +174,8 @@ class FlowborneBake(bpy.types.Operator):
 
     def execute(self, context: Any) -> set[str]:
         with _reported(self):
-            armature = armature_of(context)
-            job = job_of(armature.flowborne, engine_of(context))
+            armature, job, motion = _result(context)
             reaction = job.reaction
-            motion = read_motion(job.run).after(reaction.lead, reaction.loop)
             chosen = {
                 "FREE": lambda: [*motion.moving[: reaction.floats], *reaction.bones],
                 "SELECTED": lambda: [bone.name for bone in selected_bones(armature)],

@@ -17,6 +17,7 @@ from .operators import (
     FlowborneBake,
     FlowborneCancel,
     FlowborneChoose,
+    FlowborneForces,
     FlowborneInstall,
     FlowbornePreset,
     FlowborneRun,
@@ -116,6 +117,7 @@ class FlowbornePanel(bpy.types.Panel):
         elif job.state is not State.DONE:
             layout.operator(FlowborneRun.bl_idname, text="Resume").resume = True
         layout.operator_menu_enum(FlowborneBake.bl_idname, "bones")
+        layout.operator(FlowborneForces.bl_idname)
 
 
 class FlowborneRunsPanel(bpy.types.Panel):
@@ -160,6 +162,7 @@ CLASSES = (
     FlowborneRun,
     FlowborneCancel,
     FlowborneBake,
+    FlowborneForces,
     FlowbornePreset,
     FlowborneSelect,
     FlowborneChoose,

@@ -53,7 +53,9 @@ def stand_in(
             skin = mesh.copy()
             skin.animation_data_clear()
             skin.constraints.clear()
-            skin.parent, skin.matrix_world = None, mesh.matrix_world
+            skin.parent, skin.parent_type = copy, "OBJECT"
+            skin.matrix_parent_inverse = copy.matrix_world.inverted()
+            skin.matrix_world = mesh.matrix_world
             modifiers = [each for each in skin.modifiers if each.type == "ARMATURE"]
             for modifier in modifiers or [skin.modifiers.new(name, "ARMATURE")]:
                 modifier.object = copy
