@@ -12,6 +12,7 @@ from typing import Any
 
 import bpy
 import numpy as np
+from mathutils import Vector as Corner
 
 from .motion import Array
 from .reaction import Reaction, ReactionError, Vector
@@ -127,6 +128,19 @@ def flow_of(settings: Any) -> Vector:
     return x, y, z
 
 
+def ink_of(settings: Any, unit: float) -> tuple[Vector, Vector] | tuple[()]:
+    """Corners in m of the box around the object that colours the flow; empty without one."""
+    source = settings.ink if settings.simulated else None
+    if source is None:
+        return ()
+    corners = np.array([source.matrix_world @ Corner(corner) for corner in source.bound_box])
+    if not np.ptp(corners, axis=0).all():
+        raise ReactionError(f"object '{source.name}' has no volume: choose a mesh for Ink")
+    x, y, z = (unit * corners.min(axis=0)).tolist()
+    u, v, w = (unit * corners.max(axis=0)).tolist()
+    return (x, y, z), (u, v, w)
+
+
 def reaction_of(context: Any, armature: Any, settings: Any) -> Reaction:
     """The settings of a run, from the panel, the selected pose bones and the scene.
 
@@ -159,6 +173,7 @@ def reaction_of(context: Any, armature: Any, settings: Any) -> Reaction:
         objective=settings.objective,
         follow=settings.follow,
         strength=math.degrees(settings.strength),
+        ink=ink_of(settings, unit),
     )
 
 

@@ -76,21 +76,30 @@ class Motion:
 
         raises  MotionError when the run has not come that far
         """
-        if len(self.position) <= lead:
-            raise MotionError(
-                f"the run has {len(self.position) - 1} frames, and the bake starts after {lead}: "
-                "resume the run"
-            )
-        start, turned = self.of(self.moving[0])
-        back = turned[0] @ turned[lead].T if loop else np.eye(3)
-        begin, end = (start[lead], start[0]) if loop else (0.0, 0.0)
+        turn, shift = self.back(lead)
+        if not loop:
+            turn, shift = np.eye(3), np.zeros(3)
         return replace(
             self,
-            position=(self.position[lead:] - begin) @ back.T + end,
-            rotation=back @ self.rotation[lead:],
-            centre=(self.centre[lead:] - begin) @ back.T + end,
-            force=self.force[lead:] @ back.T,
+            position=self.position[lead:] @ turn.T + shift,
+            rotation=turn @ self.rotation[lead:],
+            centre=self.centre[lead:] @ turn.T + shift,
+            force=self.force[lead:] @ turn.T,
         )
+
+    def back(self, frame: int) -> tuple[Array, Array]:
+        """(3, 3) and (3,) m that move the root from where it is in a frame to where it starts.
+
+        raises  MotionError when the run has not come that far
+        """
+        if len(self.position) <= frame:
+            raise MotionError(
+                f"the run has {len(self.position) - 1} frames, and the bake starts after {frame}: "
+                "resume the run"
+            )
+        position, rotation = self.of(self.moving[0])
+        turn = rotation[0] @ rotation[frame].T
+        return turn, position[0] - turn @ position[frame]
 
     def ends_apart(self, bones: Iterable[str]) -> float:
         """Largest rotation of bones, relative to the root, from first to last frame, degrees."""

@@ -16,6 +16,7 @@ from .character import armature_of, control_of, selected_bones
 from .environment import Install, engine_command
 from .forces import add_forces
 from .ghost import remove_ghosts, show_ghost
+from .ink import add_ink
 from .job import Job
 from .jobs import (
     ERRORS,
@@ -73,6 +74,8 @@ class _Watch:
             return {"PASS_THROUGH"}
         if isinstance(job, Job):
             remove_ghosts(job)
+            if job.state is State.EXPORTED:
+                add_ink(context, job)
         context.window_manager.event_timer_remove(self._timer)
         if isinstance(job, Install) and job.state is State.DONE:
             preferences_of(context).engine = str(job.folder)
@@ -111,6 +114,22 @@ class FlowborneRun(_Watch, bpy.types.Operator):
             else:
                 job = start_job(context, engine_of(context), self.only_check)
             return self._watch(context, job, armature_of(context).name)
+        return {"CANCELLED"}
+
+
+class FlowborneInk(_Watch, bpy.types.Operator):
+    """Write the ink of the run to files, and add a volume object that plays them. Escape cancels"""
+
+    bl_idname = "flowborne.ink"
+    bl_label = "Show Ink"
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012 - Blender's way
+
+    def execute(self, context: Any) -> set[str]:
+        with _reported(self):
+            job = job_of(armature_of(context).flowborne, engine_of(context))
+            job.engine = engine_command(engine_of(context))
+            job.start_export()
+            return self._watch(context, job)
         return {"CANCELLED"}
 
 

@@ -18,6 +18,7 @@ from .operators import (
     FlowborneCancel,
     FlowborneChoose,
     FlowborneForces,
+    FlowborneInk,
     FlowborneInstall,
     FlowbornePreset,
     FlowborneRun,
@@ -92,6 +93,7 @@ class FlowbornePanel(bpy.types.Panel):
         layout.prop(settings, "simulated")
         if settings.simulated:
             layout.prop(settings, "resolution")
+            layout.prop(settings, "ink")
         for name in ("density", "floats", "objective", "follow", "strength", "rounds"):
             layout.prop(settings, name)
         if settings.rounds == 1:
@@ -114,10 +116,12 @@ class FlowbornePanel(bpy.types.Panel):
                 layout.label(text=warning, icon="ERROR")
         if job.active:
             layout.operator(FlowborneCancel.bl_idname).folder = str(job.folder)
-        elif job.state is not State.DONE:
+        elif not job.complete:
             layout.operator(FlowborneRun.bl_idname, text="Resume").resume = True
         layout.operator_menu_enum(FlowborneBake.bl_idname, "bones")
         layout.operator(FlowborneForces.bl_idname)
+        if job.reaction.ink and not job.active:
+            layout.operator(FlowborneInk.bl_idname)
 
 
 class FlowborneRunsPanel(bpy.types.Panel):
@@ -163,6 +167,7 @@ CLASSES = (
     FlowborneCancel,
     FlowborneBake,
     FlowborneForces,
+    FlowborneInk,
     FlowbornePreset,
     FlowborneSelect,
     FlowborneChoose,
