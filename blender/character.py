@@ -217,19 +217,27 @@ def _is_full(constraint: Any) -> bool:
     return full and constraint.target == constraint.id_data
 
 
+def is_selected(bone: Any) -> bool:
+    """Whether a pose bone is selected and shown: hidden bones of a rig may be selected unseen."""
+    collections = bone.bone.collections
+    shown = not collections or any(each.is_visible_effectively for each in collections)
+    return bool(shown and bone.select and not bone.hide)
+
+
 def selected_bones(armature: Any) -> list[Any]:
     """Deforming pose bones that are selected, or whose control is.
 
     raises  ReactionError for other bones in the selection
     """
     controls = {bone: control_of(bone) for bone in armature.pose.bones if bone.bone.use_deform}
-    for bone in armature.pose.bones:
-        if bone.select and bone not in controls and bone not in controls.values():
+    selected = [bone for bone in armature.pose.bones if is_selected(bone)]
+    for bone in selected:
+        if bone not in controls and bone not in controls.values():
             raise ReactionError(
                 f"bone '{bone.name}' deforms nothing, and no deforming bone copies its place: "
                 "select others (in Rigify those of the collection 'Tweak' or 'DEF')"
             )
-    return [bone for bone, control in controls.items() if bone.select or control.select]
+    return [bone for bone, control in controls.items() if {bone, control} & {*selected}]
 
 
 def in_frames(context: Any, frames: Iterable[int]) -> Iterator[int]:

@@ -72,12 +72,13 @@ class _Watch:
             show_ghost(context, things[self._armature], job)
         if job.active:
             return {"PASS_THROUGH"}
+        context.window_manager.event_timer_remove(self._timer)
         if isinstance(job, Job):
             remove_ghosts(job)
             if job.state is State.EXPORTED:
-                add_ink(context, job)
-        context.window_manager.event_timer_remove(self._timer)
-        if isinstance(job, Install) and job.state is State.DONE:
+                with _reported(self):
+                    add_ink(context, job)
+        elif job.state is State.DONE:
             preferences_of(context).engine = str(job.folder)
             context.preferences.is_dirty = True
         self.report({"ERROR" if job.state is State.FAILED else "INFO"}, job.line)
@@ -240,7 +241,7 @@ class FlowbornePreset(bpy.types.Operator):
                     f"no deforming bone below the root of '{armature.name}' has one of these words "
                     f"in its name: {', '.join(PRESETS[self.kind])}. Select bones in Pose Mode"
                 )
-            _select(armature, [control_of(armature.pose.bones[name]).name for name in found])
+            _select(armature, found)
             self.report({"INFO"}, f"selected {', '.join(found)}")
             return {"FINISHED"}
         return {"CANCELLED"}
@@ -268,10 +269,11 @@ class FlowborneSelect(bpy.types.Operator):
 
 
 def _select(armature: Any, names: list[str]) -> None:
-    """Select these pose bones alone, and make the first one active."""
+    """Select these pose bones alone, or the controls whose place they copy."""
+    chosen = [control_of(armature.pose.bones[name]) for name in names]
     for bone in armature.pose.bones:
-        bone.select = bone.name in names
-    armature.data.bones.active = armature.data.bones[names[0]]
+        bone.select = bone in chosen
+    armature.data.bones.active = chosen[0].bone
 
 
 class FlowborneChoose(bpy.types.Operator):

@@ -8,7 +8,7 @@ from typing import Any
 import bpy
 from bpy.props import PointerProperty, StringProperty
 
-from .character import armature_of
+from .character import armature_of, is_selected
 from .environment import Install
 from .ghost import remove_stale
 from .job import Job
@@ -81,7 +81,7 @@ class FlowbornePanel(bpy.types.Panel):
             layout.label(text=str(error), icon="INFO")
             return
         settings = armature.flowborne
-        free = sum(bone.select for bone in armature.pose.bones)
+        free = sum(map(is_selected, armature.pose.bones))
         layout.label(text=f"{armature.name}: {free} free bones (selected in Pose Mode)")
         layout.operator_menu_enum(FlowbornePreset.bl_idname, "kind")
         layout.prop(settings, "medium")
