@@ -12,10 +12,11 @@ from typing import Any
 
 import bpy
 import numpy as np
+from mathutils import Vector as Corner
 
 from .motion import Array
 from .reaction import Reaction, ReactionError, Vector
-from .stand_in import parents_of, play, remove, stand_in
+from .stand_in import parents_of, play, stand_in
 
 TRACK = "flowborne"
 """Start of the names of our NLA tracks."""
@@ -127,6 +128,19 @@ def flow_of(settings: Any) -> Vector:
     return x, y, z
 
 
+def ink_of(settings: Any, unit: float) -> tuple[Vector, Vector] | tuple[()]:
+    """Corners in m of the box around the object that colours the flow; empty without one."""
+    source = settings.ink if settings.simulated else None
+    if source is None:
+        return ()
+    corners = np.array([source.matrix_world @ Corner(corner) for corner in source.bound_box])
+    if not np.ptp(corners, axis=0).all():
+        raise ReactionError(f"object '{source.name}' has no volume: choose a mesh for Ink")
+    x, y, z = (unit * corners.min(axis=0)).tolist()
+    u, v, w = (unit * corners.max(axis=0)).tolist()
+    return (x, y, z), (u, v, w)
+
+
 def reaction_of(context: Any, armature: Any, settings: Any) -> Reaction:
     """The settings of a run, from the panel, the selected pose bones and the scene.
 
@@ -159,6 +173,7 @@ def reaction_of(context: Any, armature: Any, settings: Any) -> Reaction:
         objective=settings.objective,
         follow=settings.follow,
         strength=math.degrees(settings.strength),
+        ink=ink_of(settings, unit),
     )
 
 
@@ -202,19 +217,27 @@ def _is_full(constraint: Any) -> bool:
     return full and constraint.target == constraint.id_data
 
 
+def is_selected(bone: Any) -> bool:
+    """Whether a pose bone is selected and shown: hidden bones of a rig may be selected unseen."""
+    collections = bone.bone.collections
+    shown = not collections or any(each.is_visible_effectively for each in collections)
+    return bool(shown and bone.select and not bone.hide)
+
+
 def selected_bones(armature: Any) -> list[Any]:
     """Deforming pose bones that are selected, or whose control is.
 
     raises  ReactionError for other bones in the selection
     """
     controls = {bone: control_of(bone) for bone in armature.pose.bones if bone.bone.use_deform}
-    for bone in armature.pose.bones:
-        if bone.select and bone not in controls and bone not in controls.values():
+    selected = [bone for bone in armature.pose.bones if is_selected(bone)]
+    for bone in selected:
+        if bone not in controls and bone not in controls.values():
             raise ReactionError(
                 f"bone '{bone.name}' deforms nothing, and no deforming bone copies its place: "
                 "select others (in Rigify those of the collection 'Tweak' or 'DEF')"
             )
-    return [bone for bone, control in controls.items() if bone.select or control.select]
+    return [bone for bone, control in controls.items() if {bone, control} & {*selected}]
 
 
 def in_frames(context: Any, frames: Iterable[int]) -> Iterator[int]:
@@ -272,9 +295,8 @@ def export_character(context: Any, armature: Any, path: Path, first: int, last: 
     frames, bones = range(first, last + 1), parents_of(armature.data.bones)
     with _without_bakes(armature):
         places, poses = poses_of(context, armature, frames, bones)
-    scene, render = bpy.data.scenes.new(TRACK), context.scene.render
-    try:
-        copy = stand_in(context, scene, armature, meshes, armature.name)
+    render = context.scene.render
+    with stand_in(context, armature, meshes, armature.name) as (copy, scene):
         play(copy, range(len(frames)), {name: places @ pose for name, pose in poses.items()})
         scene.frame_start, scene.frame_end = 0, last - first
         # Times of the file are in seconds, but the exporter multiplies by the base of the rate.
@@ -299,9 +321,6 @@ def export_character(context: Any, armature: Any, path: Path, first: int, last: 
                 export_cameras=False,
                 export_lights=False,
             )
-    finally:
-        remove(scene.objects)
-        bpy.data.scenes.remove(scene)
 
 
 @contextmanager

@@ -29,12 +29,14 @@ class Job(Process):
     engine    command of flowborne
     folder    of the job, with CHARACTER
     reaction  settings
+    run       folder of the run
+    volumes   stands for flow_0000.vdb and so on, of `start_export`
     """
 
     def __init__(self, engine: Sequence[str], folder: Path, reaction: Reaction) -> None:
         super().__init__(folder / "log.txt")
         self.engine, self.folder, self.reaction = tuple(engine), folder, reaction
-        self.run = folder / "run"
+        self.run, self.volumes = folder / "run", folder / "volumes" / "flow.vdb"
         self._scene = folder / "scene" / "reaction.toml"
         self._only_check = False
         self._pace: tuple[float, int] | None = None
@@ -44,8 +46,7 @@ class Job(Process):
         """The job of a folder, also after a restart of Blender. Raises ReactionError without one"""
         job = cls(engine, folder, Reaction.load(folder / "job.json"))
         if job.frames_done:
-            complete = job.frames_done >= job.reaction.frames
-            job.state = State.DONE if complete else State.CANCELLED
+            job.state = State.DONE if job.complete else State.CANCELLED
         return job
 
     def start(self, only_check: bool = False) -> None:
@@ -66,6 +67,17 @@ class Job(Process):
         command = ["import", str(self.folder / CHARACTER), "--out", str(scene), "--fill", *size]
         self._spawn(State.IMPORTING, [*self.engine, *command])
 
+    def start_export(self) -> None:
+        """Start to write the flow of each frame to a volume. Raises JobError like `start`."""
+        if self.active:
+            raise JobError("the run is in progress: wait for its end, or cancel it")
+        if not self.reaction.ink or not self.frames_done:
+            raise JobError("this run has no ink: choose an object in Ink, and start a new run")
+        self.message = ""
+        self.volumes.parent.mkdir(exist_ok=True)
+        command = ["export", str(self.run), "--out", str(self.volumes)]
+        self._spawn(State.EXPORTING, [*self.engine, *command])
+
     def step(self) -> State:
         """Look after the child once, without waiting for it, and return the state."""
         if super().step() is State.RUNNING and self._pace is None and self.frames_done:
@@ -76,6 +88,11 @@ class Job(Process):
     def frames_done(self) -> int:
         """Frames in the run folder."""
         return max(sum(1 for _ in (self.run / "states").glob("[0-9]*.npz")) - 1, 0)
+
+    @property
+    def complete(self) -> bool:
+        """Whether the run has all its frames."""
+        return self.frames_done >= self.reaction.frames
 
     @property
     def seconds_left(self) -> float | None:
@@ -119,7 +136,7 @@ class Job(Process):
             said += f", frame {self.frames_done}/{self.reaction.frames}"
         if left is not None:
             return f"{said}, {left:.0f} s left"
-        return f"{said}: {self.cost}" if self.cost and self.state is not State.DONE else said
+        return f"{said}: {self.cost}" if self.cost and not self.complete else said
 
     def _ended(self, code: int) -> None:
         if code == 0 and self.state is State.IMPORTING:
@@ -127,6 +144,8 @@ class Job(Process):
             self._go_on()
         elif code == 0 and self.state is State.CHECKING:
             self.state = State.CHECKED
+        elif code == 0 and self.state is State.EXPORTING:
+            self.state = State.EXPORTED
         elif code in (0, DOUBTFUL) and self.frames_done:
             self.state, self.message = State.DONE, self._said() if code else ""
         else:

@@ -101,6 +101,7 @@ def job_in(folder: Path, engine: str) -> Job:
     job = JOBS.get(str(folder))
     if not isinstance(job, Job):
         job = JOBS[str(folder)] = Job.load(engine_command(engine) if engine else (), folder)
+    job.step()  # its operator ends when another file is opened
     return job
 
 

@@ -19,6 +19,10 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 
+STATE = ("body_position", "body_rotation", "fluid_centre", "fluid_force")
+"""Arrays of a state, in the order of the fields of `Motion`."""
+
+
 class MotionError(Exception):
     """A run cannot be baked; the text says why and what to do."""
 
@@ -31,12 +35,16 @@ class Motion:
     moving    names of those that have a joint, the root first; others are rigid with their parent
     position  (frames, n, 3) m
     rotation  (frames, n, 3, 3) from the axes of the bone to the world's
+    centre    (frames, n, 3) m, of the mass of the body
+    force     (frames, n, 3) N, of air or water on it
     """
 
     names: tuple[str, ...]
     moving: tuple[str, ...]
     position: Array
     rotation: Array
+    centre: Array
+    force: Array
 
     def of(self, bone: str) -> tuple[Array, Array]:
         """(frames, 3) m and (frames, 3, 3) of a bone."""
@@ -68,18 +76,30 @@ class Motion:
 
         raises  MotionError when the run has not come that far
         """
-        if len(self.position) <= lead:
+        turn, shift = self.back(lead)
+        if not loop:
+            turn, shift = np.eye(3), np.zeros(3)
+        return replace(
+            self,
+            position=self.position[lead:] @ turn.T + shift,
+            rotation=turn @ self.rotation[lead:],
+            centre=self.centre[lead:] @ turn.T + shift,
+            force=self.force[lead:] @ turn.T,
+        )
+
+    def back(self, frame: int) -> tuple[Array, Array]:
+        """(3, 3) and (3,) m that move the root from where it is in a frame to where it starts.
+
+        raises  MotionError when the run has not come that far
+        """
+        if len(self.position) <= frame:
             raise MotionError(
-                f"the run has {len(self.position) - 1} frames, and the bake starts after {lead}: "
+                f"the run has {len(self.position) - 1} frames, and the bake starts after {frame}: "
                 "resume the run"
             )
-        position, rotation = self.position[lead:], self.rotation[lead:]
-        if loop:
-            start, turned = self.of(self.moving[0])
-            back = turned[0] @ turned[lead].T
-            position = (position - start[lead]) @ back.T + start[0]
-            rotation = back @ rotation
-        return replace(self, position=position, rotation=rotation)
+        position, rotation = self.of(self.moving[0])
+        turn = rotation[0] @ rotation[frame].T
+        return turn, position[0] - turn @ position[frame]
 
     def ends_apart(self, bones: Iterable[str]) -> float:
         """Largest rotation of bones, relative to the root, from first to last frame, degrees."""
@@ -88,25 +108,25 @@ class Motion:
         return max((float(angles(*pair)) for pair in ends), default=0.0)
 
 
-def read_motion(run: Path) -> Motion:
-    """The motion of a run, complete or not.
+def read_motion(run: Path, start: int = 0) -> Motion:
+    """The motion of a run, complete or not, from a frame on.
 
     raises  MotionError when there is no frame, or a file cannot be read
     """
     try:
         model: dict[str, Any] = json.loads((run / "model.json").read_text(encoding="utf-8"))
-        states = [_read(path) for path in sorted((run / "states").glob("[0-9]*.npz"))]
+        states = [_read(path) for path in sorted((run / "states").glob("[0-9]*.npz"))[start:]]
         if not states:
             raise ValueError("it has no states")
-        position, rotation = (np.array(values, np.float64) for values in zip(*states, strict=True))
-        return Motion(tuple(model["bodies"]), tuple(model["joints"]), position, rotation)
+        arrays = (np.array(values, np.float64) for values in zip(*states, strict=True))
+        return Motion(tuple(model["bodies"]), tuple(model["joints"]), *arrays)
     except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
         raise MotionError(f"{run} has no frames to bake ({error}): resume the run") from error
 
 
-def _read(path: Path) -> tuple[Array, Array]:
+def _read(path: Path) -> list[Array]:
     with np.load(path) as state:
-        return state["body_position"], state["body_rotation"]
+        return [state[name] for name in STATE]
 
 
 def angles(one: Array, other: Array) -> Array:

@@ -14,6 +14,9 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, St
 from .bake import bake, turned_away
 from .character import armature_of, control_of, selected_bones
 from .environment import Install, engine_command
+from .forces import add_forces
+from .ghost import remove_ghosts, show_ghost
+from .ink import add_ink
 from .job import Job
 from .jobs import (
     ERRORS,
@@ -26,7 +29,7 @@ from .jobs import (
     start_install,
     start_job,
 )
-from .motion import read_motion
+from .motion import Motion, read_motion
 from .presets import PRESETS, named_in, preset
 from .process import State
 from .reaction import ReactionError
@@ -49,8 +52,8 @@ class _Watch:
 
     report: Callable[..., None]
 
-    def _watch(self, context: Any, job: Job | Install) -> set[str]:
-        manager, self._job = context.window_manager, job
+    def _watch(self, context: Any, job: Job | Install, armature: str = "") -> set[str]:
+        manager, self._job, self._armature = context.window_manager, job, armature
         self._timer = manager.event_timer_add(PERIOD, window=context.window)
         manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
@@ -64,10 +67,18 @@ class _Watch:
         job.step()
         for area in context.screen.areas if context.screen else ():
             area.tag_redraw()
+        things = bpy.data.objects
+        if isinstance(job, Job) and job.state is State.RUNNING and self._armature in things:
+            show_ghost(context, things[self._armature], job)
         if job.active:
             return {"PASS_THROUGH"}
         context.window_manager.event_timer_remove(self._timer)
-        if isinstance(job, Install) and job.state is State.DONE:
+        if isinstance(job, Job):
+            remove_ghosts(job)
+            if job.state is State.EXPORTED:
+                with _reported(self):
+                    add_ink(context, job)
+        elif job.state is State.DONE:
             preferences_of(context).engine = str(job.folder)
             context.preferences.is_dirty = True
         self.report({"ERROR" if job.state is State.FAILED else "INFO"}, job.line)
@@ -103,6 +114,22 @@ class FlowborneRun(_Watch, bpy.types.Operator):
                 job.start()
             else:
                 job = start_job(context, engine_of(context), self.only_check)
+            return self._watch(context, job, armature_of(context).name)
+        return {"CANCELLED"}
+
+
+class FlowborneInk(_Watch, bpy.types.Operator):
+    """Write the ink of the run to files, and add a volume object that plays them. Escape cancels"""
+
+    bl_idname = "flowborne.ink"
+    bl_label = "Show Ink"
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012 - Blender's way
+
+    def execute(self, context: Any) -> set[str]:
+        with _reported(self):
+            job = job_of(armature_of(context).flowborne, engine_of(context))
+            job.engine = engine_command(engine_of(context))
+            job.start_export()
             return self._watch(context, job)
         return {"CANCELLED"}
 
@@ -119,6 +146,28 @@ class FlowborneCancel(bpy.types.Operator):
         if self.folder in JOBS:
             JOBS[self.folder].cancel()
         return {"FINISHED"}
+
+
+def _result(context: Any) -> tuple[Any, Job, Motion]:
+    """The active armature, its last job, and what it gives. Raises one of ERRORS."""
+    armature = armature_of(context)
+    job = job_of(armature.flowborne, engine_of(context))
+    return armature, job, read_motion(job.run).after(job.reaction.lead, job.reaction.loop)
+
+
+class FlowborneForces(bpy.types.Operator):
+    """Add the forces on the bodies as points with attributes, and arrows by geometry nodes"""
+
+    bl_idname = "flowborne.forces"
+    bl_label = "Show Forces"
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012 - Blender's way
+
+    def execute(self, context: Any) -> set[str]:
+        with _reported(self):
+            armature, job, motion = _result(context)
+            add_forces(context, armature, motion, job.reaction.first, job.reaction.unit)
+            return {"FINISHED"}
+        return {"CANCELLED"}
 
 
 class FlowborneBake(bpy.types.Operator):
@@ -145,10 +194,8 @@ class FlowborneBake(bpy.types.Operator):
 
     def execute(self, context: Any) -> set[str]:
         with _reported(self):
-            armature = armature_of(context)
-            job = job_of(armature.flowborne, engine_of(context))
+            armature, job, motion = _result(context)
             reaction = job.reaction
-            motion = read_motion(job.run).after(reaction.lead, reaction.loop)
             chosen = {
                 "FREE": lambda: [*motion.moving[: reaction.floats], *reaction.bones],
                 "SELECTED": lambda: [bone.name for bone in selected_bones(armature)],
@@ -194,7 +241,7 @@ class FlowbornePreset(bpy.types.Operator):
                     f"no deforming bone below the root of '{armature.name}' has one of these words "
                     f"in its name: {', '.join(PRESETS[self.kind])}. Select bones in Pose Mode"
                 )
-            _select(armature, [control_of(armature.pose.bones[name]).name for name in found])
+            _select(armature, found)
             self.report({"INFO"}, f"selected {', '.join(found)}")
             return {"FINISHED"}
         return {"CANCELLED"}
@@ -222,10 +269,11 @@ class FlowborneSelect(bpy.types.Operator):
 
 
 def _select(armature: Any, names: list[str]) -> None:
-    """Select these pose bones alone, and make the first one active."""
+    """Select these pose bones alone, or the controls whose place they copy."""
+    chosen = [control_of(armature.pose.bones[name]) for name in names]
     for bone in armature.pose.bones:
-        bone.select = bone.name in names
-    armature.data.bones.active = armature.data.bones[names[0]]
+        bone.select = bone in chosen
+    armature.data.bones.active = chosen[0].bone
 
 
 class FlowborneChoose(bpy.types.Operator):

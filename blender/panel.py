@@ -8,14 +8,17 @@ from typing import Any
 import bpy
 from bpy.props import PointerProperty, StringProperty
 
-from .character import armature_of
+from .character import armature_of, is_selected
 from .environment import Install
+from .ghost import remove_stale
 from .job import Job
 from .jobs import ERRORS, JOBS, engine_of, folders_of, install_of, job_in, job_of
 from .operators import (
     FlowborneBake,
     FlowborneCancel,
     FlowborneChoose,
+    FlowborneForces,
+    FlowborneInk,
     FlowborneInstall,
     FlowbornePreset,
     FlowborneRun,
@@ -78,7 +81,7 @@ class FlowbornePanel(bpy.types.Panel):
             layout.label(text=str(error), icon="INFO")
             return
         settings = armature.flowborne
-        free = sum(bone.select for bone in armature.pose.bones)
+        free = sum(map(is_selected, armature.pose.bones))
         layout.label(text=f"{armature.name}: {free} free bones (selected in Pose Mode)")
         layout.operator_menu_enum(FlowbornePreset.bl_idname, "kind")
         layout.prop(settings, "medium")
@@ -90,6 +93,7 @@ class FlowbornePanel(bpy.types.Panel):
         layout.prop(settings, "simulated")
         if settings.simulated:
             layout.prop(settings, "resolution")
+            layout.prop(settings, "ink")
         for name in ("density", "floats", "objective", "follow", "strength", "rounds"):
             layout.prop(settings, name)
         if settings.rounds == 1:
@@ -112,9 +116,12 @@ class FlowbornePanel(bpy.types.Panel):
                 layout.label(text=warning, icon="ERROR")
         if job.active:
             layout.operator(FlowborneCancel.bl_idname).folder = str(job.folder)
-        elif job.state is not State.DONE:
+        elif not job.complete:
             layout.operator(FlowborneRun.bl_idname, text="Resume").resume = True
         layout.operator_menu_enum(FlowborneBake.bl_idname, "bones")
+        layout.operator(FlowborneForces.bl_idname)
+        if job.reaction.ink and not job.active:
+            layout.operator(FlowborneInk.bl_idname)
 
 
 class FlowborneRunsPanel(bpy.types.Panel):
@@ -159,6 +166,8 @@ CLASSES = (
     FlowborneRun,
     FlowborneCancel,
     FlowborneBake,
+    FlowborneForces,
+    FlowborneInk,
     FlowbornePreset,
     FlowborneSelect,
     FlowborneChoose,
@@ -172,6 +181,8 @@ def register() -> None:
     for each in CLASSES:
         bpy.utils.register_class(each)
     bpy.types.Object.flowborne = PointerProperty(type=FlowborneSettings)
+    for handlers in (bpy.app.handlers.undo_post, bpy.app.handlers.redo_post):
+        handlers.append(remove_stale)
 
 
 def unregister() -> None:
@@ -179,6 +190,9 @@ def unregister() -> None:
     for job in JOBS.values():
         job.close()
     JOBS.clear()
+    remove_stale()
+    for handlers in (bpy.app.handlers.undo_post, bpy.app.handlers.redo_post):
+        handlers.remove(remove_stale)
     del bpy.types.Object.flowborne
     for each in reversed(CLASSES):
         bpy.utils.unregister_class(each)

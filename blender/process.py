@@ -32,13 +32,15 @@ class State(Enum):
     CHECKING = "checking the scene"
     CHECKED = "checked"
     RUNNING = "running"
+    EXPORTING = "writing volumes"
+    EXPORTED = "volumes written"
     STOPPING = "stopping"
     CANCELLED = "cancelled"
     FAILED = "failed"
     DONE = "done"
 
 
-IDLE = (State.NEW, State.CHECKED, State.CANCELLED, State.FAILED, State.DONE)
+IDLE = (State.NEW, State.CHECKED, State.EXPORTED, State.CANCELLED, State.FAILED, State.DONE)
 """States in which no child runs."""
 
 

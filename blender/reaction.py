@@ -66,6 +66,7 @@ class Reaction:
     strength    largest rate of a bone, degrees/s
     lead        frames of the run before `first`, in which bones settle
     loop        whether the animation is a cycle that the run repeats; its last round is baked
+    ink         corners of a box in which the simulated flow is coloured, m; empty without one
     """
 
     bones: tuple[str, ...]
@@ -86,6 +87,7 @@ class Reaction:
     strength: float = 90.0
     lead: int = 0
     loop: bool = False
+    ink: tuple[Vector, Vector] | tuple[()] = ()
 
     def __post_init__(self) -> None:
         if not self.bones:
@@ -110,7 +112,7 @@ class Reaction:
         """The settings from a file of `save`. Raises ReactionError when it cannot be read."""
         try:
             found = json.loads(path.read_text(encoding="utf-8"))
-            lists = {key: tuple(found[key]) for key in ("bones", "flow", "gravity")}
+            lists = {key: tuple(found[key]) for key in ("bones", "flow", "gravity", "ink")}
             return cls(**found | lists)
         except (OSError, ValueError, TypeError, KeyError) as error:
             raise ReactionError(f"{path} cannot be read ({error}): start a new run") from error
@@ -166,6 +168,9 @@ def scene_of(imported: Mapping[str, Any], reaction: Reaction, root: str) -> dict
         time["steps_per_frame"] = math.ceil(max(steps, crossed))
         scene["domain"] = domain | {"resolution": reaction.resolution}
         scene["fluid"] = {"density": reaction.medium, "velocity": reaction.flow}
+        if reaction.ink:
+            lower, upper = reaction.ink
+            scene["dye"] = [{"kind": "box", "lower": lower, "upper": upper}]
         far = {"kind": "far", "velocity": reaction.flow}
         scene["boundaries"] = {f"{axis}_{end}": far for axis in "xyz" for end in ("min", "max")}
     else:

@@ -42,6 +42,11 @@ class FlowborneSettings(bpy.types.PropertyGroup):
     resolution: IntProperty(
         name="Cells", description="Along the longest side", default=48, min=16, max=512
     )
+    ink: PointerProperty(
+        name="Ink",
+        description="Object in whose bounding box the simulated flow is coloured",
+        type=bpy.types.Object,
+    )
     density: FloatProperty(
         name="Body", description="Density of the character, kg/m³", default=1000.0, min=1e-3
     )

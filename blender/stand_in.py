@@ -7,7 +7,8 @@ from any frame, and shows frames of a run whatever the character does.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import bpy
@@ -21,35 +22,48 @@ SAME_PLACE = 1e-4
 """Largest difference of rest poses of two bones in the same place, in lengths of the bone."""
 
 
-def stand_in(context: Any, scene: Any, armature: Any, meshes: Iterable[Any], name: str) -> Any:
-    """A new armature in a scene, at rest where the character is in this frame, with its meshes."""
-    data = bpy.data.armatures.new(name)
+@contextmanager
+def stand_in(
+    context: Any, armature: Any, meshes: Iterable[Any], name: str
+) -> Iterator[tuple[Any, Any]]:
+    """A new armature, at rest where the character is in this frame, with its meshes.
+
+    Gives it and the scene in which they are. This scene is removed at the end of the context, with
+    all objects that are in no other one.
+    """
+    scene, data = bpy.data.scenes.new(name), bpy.data.armatures.new(name)
     copy = bpy.data.objects.new(name, data)
-    copy.matrix_world = armature.matrix_world
     scene.collection.objects.link(copy)
+    copy.matrix_world = armature.matrix_world
     layer = scene.view_layers[0]
-    with context.temp_override(scene=scene, view_layer=layer, object=copy, active_object=copy):
-        layer.objects.active = copy
-        bpy.ops.object.mode_set(mode="EDIT")
-        parents = parents_of(armature.data.bones)
-        for bone in armature.data.bones:
-            if bone.name in parents:
-                edited = data.edit_bones.new(bone.name)
-                edited.head, edited.tail = bone.head_local, bone.tail_local
-                edited.align_roll(bone.matrix_local.col[2].xyz)
-        for bone, above in parents.items():
-            data.edit_bones[bone].parent = data.edit_bones.get(above)
-        bpy.ops.object.mode_set(mode="OBJECT")
-    for mesh in meshes:
-        skin = mesh.copy()
-        skin.animation_data_clear()
-        skin.constraints.clear()
-        skin.parent, skin.matrix_world = None, mesh.matrix_world
-        modifiers = [each for each in skin.modifiers if each.type == "ARMATURE"]
-        for modifier in modifiers or [skin.modifiers.new(name, "ARMATURE")]:
-            modifier.object = copy
-        scene.collection.objects.link(skin)
-    return copy
+    layer.objects.active = copy
+    try:
+        with context.temp_override(scene=scene, view_layer=layer, object=copy, active_object=copy):
+            bpy.ops.object.mode_set(mode="EDIT")
+            parents = parents_of(armature.data.bones)
+            for bone in armature.data.bones:
+                if bone.name in parents:
+                    edited = data.edit_bones.new(bone.name)
+                    edited.head, edited.tail = bone.head_local, bone.tail_local
+                    edited.align_roll(bone.matrix_local.col[2].xyz)
+            for each, above in parents.items():
+                data.edit_bones[each].parent = data.edit_bones.get(above)
+            bpy.ops.object.mode_set(mode="OBJECT")
+        for mesh in meshes:
+            skin = mesh.copy()
+            skin.animation_data_clear()
+            skin.constraints.clear()
+            skin.parent, skin.parent_type = copy, "OBJECT"
+            skin.matrix_parent_inverse = copy.matrix_world.inverted()
+            skin.matrix_world = mesh.matrix_world
+            modifiers = [each for each in skin.modifiers if each.type == "ARMATURE"]
+            for modifier in modifiers or [skin.modifiers.new(name, "ARMATURE")]:
+                modifier.object = copy
+            scene.collection.objects.link(skin)
+        yield copy, scene
+    finally:
+        remove(each for each in scene.objects if len(each.users_scene) == 1)
+        bpy.data.scenes.remove(scene)
 
 
 def parents_of(bones: Sequence[Any]) -> dict[str, str]:
@@ -106,8 +120,8 @@ def play(copy: Any, frames: Sequence[float], poses: Mapping[str, Array]) -> None
 
 def remove(objects: Iterable[Any]) -> None:
     """Remove objects of stand-ins, with their armatures and actions."""
-    gone = list(objects)
-    for each in list(gone):
-        gone += [each.data] if each.type == "ARMATURE" else []
-        gone += [each.animation_data.action] if each.animation_data else []
-    bpy.data.batch_remove(gone)
+    for each in list(objects):
+        rest = [each.data] if each.type == "ARMATURE" else []
+        rest += [each.animation_data.action] if each.animation_data else []
+        bpy.data.objects.remove(each)
+        bpy.data.batch_remove(rest)

@@ -1,9 +1,9 @@
-"""A small animal whose tail reacts to wind: the .blend, and a picture before and after the bake.
+"""Samples for Blender: a tail and wings in wind, hair in water, each a .blend and a picture.
 
-    python tools/blender_sample.py --engine .venv --out build/blender-sample
+    python tools/blender_sample.py --engine .venv --out build/blender-sample [NAME ...]
 
-It needs Blender as a module, as `make blender-sample` installs it. The scene uses what an animator
-uses in the panel: a preset of bones, IK limits, a Wind field, a cycle in rounds, and the bake.
+It needs Blender as a module, as `make blender-sample` installs it. A sample uses what an animator
+uses in the panel. Its picture shows a frame before the bake (left) and after it (right).
 """
 
 from __future__ import annotations
@@ -11,244 +11,235 @@ from __future__ import annotations
 import argparse
 import sys
 import time
-from itertools import pairwise
-from math import cos, pi, radians, sin
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from math import radians
 from pathlib import Path
 from typing import Any
 
 import bpy
+import numpy as np
+
+from blender_characters import PERIOD, Colour, Point, bird, fox, paint, swimmer
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+from blender.ink import add_ink
+from blender.job import Job
 from blender.jobs import start_job
 from blender.panel import register
-from blender.process import IDLE, State
 
-PERIOD = 24
-"""Frames of the cycle."""
+SIZE = 480, 400
+"""Pixels of each half of a picture."""
 
-PICTURED = 13
-"""Frame of the pictures."""
 
-JOINTS = (0.0, 1.2, 1.5, 1.8, 2.1, 2.4, 2.7)
-"""y of the bones' heads, and of the last tail, m; the first bone is the body."""
+@dataclass(frozen=True)
+class Sample:
+    """A character, and what an animator sets.
 
-HEIGHT = 0.75
-"""z of the bones, m."""
+    character  makes it
+    preset     free bones by their names
+    limit      IK limits of the free bones, degrees
+    pictured   frame
+    camera     its place and the point at which it aims, m
+    sky        colour of what is around
+    ground     its colour; empty without one
+    arrows     where they start
+    along      direction of the flow, x or y
+    wind       m/s of a Wind field; 0 without one
+    ink        centre and size of a box in which the water is coloured, m
+    settings   of the panel
+    """
 
-PROFILE = (
-    (-0.02, 0.02),
-    (0.1, 0.2),
-    (0.35, 0.29),
-    (0.7, 0.3),
-    (1.0, 0.26),
-    (1.15, 0.16),
-    (1.3, 0.1),
-    (1.6, 0.12),
-    (1.9, 0.14),
-    (2.2, 0.15),
-    (2.45, 0.12),
-    (2.65, 0.05),
-    (2.72, 0.01),
-)
-"""(y, radius) along the animal, m."""
+    character: Callable[[], Any]
+    preset: str
+    limit: float
+    pictured: int
+    camera: tuple[Point, Point]
+    sky: Colour
+    arrows: tuple[Point, ...]
+    ground: Colour | tuple[()] = ()
+    along: Point = (0.0, 1.0, 0.0)
+    wind: float = 0.0
+    ink: tuple[Point, Point] | tuple[()] = ()
+    settings: dict[str, Any] = field(default_factory=dict)
 
-AROUND = 16
-"""Vertices of a ring."""
 
-FUR, PALE, DARK = (0.72, 0.24, 0.07), (0.85, 0.75, 0.62), (0.03, 0.02, 0.02)
-GROUND, SKY = (0.22, 0.30, 0.13), (0.62, 0.76, 0.9)
+SAMPLES = {
+    "tail": Sample(
+        fox,
+        "TAIL",
+        limit=30.0,
+        pictured=13,
+        camera=((4.8, -2.2, 2.6), (0.3, 1.25, 0.75)),
+        sky=(0.62, 0.76, 0.9),
+        ground=(0.22, 0.30, 0.13),
+        along=(1.0, 0.0, 0.0),
+        arrows=((-1.5, 1.7, 0.75), (-1.5, 2.4, 0.75), (-1.5, 3.1, 0.75)),
+        wind=12.0,
+        settings={"density": 60.0, "rounds": 4, "strength": radians(180.0), "follow": 0.05},
+    ),
+    "hair": Sample(
+        swimmer,
+        "HAIR",
+        limit=60.0,
+        pictured=19,
+        camera=((2.3, -1.5, 1.1), (0.0, 0.55, 0.1)),
+        sky=(0.05, 0.28, 0.42),
+        arrows=((-0.45, -0.35, 0.3), (-0.45, 0.25, 0.5), (-0.45, 0.85, 0.3)),
+        ink=((0.0, -0.4, 0.42), (0.3, 0.1, 0.3)),
+        settings={
+            "medium": "WATER",
+            "flow": (0.0, 1.0, 0.0),
+            "simulated": True,
+            "resolution": 40,
+            "preroll": 12,
+            "strength": radians(180.0),
+        },
+    ),
+    "wings": Sample(
+        bird,
+        "WING",
+        limit=50.0,
+        pictured=13,
+        camera=((1.1, -1.9, 1.9), (0.0, 0.15, 1.5)),
+        sky=(0.35, 0.56, 0.85),
+        arrows=((-0.6, -0.5, 1.62), (0.0, -0.55, 1.72), (0.5, -0.6, 1.35)),
+        wind=8.0,
+        settings={"density": 60.0, "rounds": 4, "strength": radians(720.0), "follow": 0.02},
+    ),
+}
 
 
 def main() -> None:
-    """Build the scene, run it, bake it, and render it."""
+    """Build, run, bake and render the samples."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--engine", required=True, help="environment of flowborne")
     parser.add_argument("--out", type=Path, required=True, help="folder")
+    parser.add_argument("names", nargs="*", metavar="NAME", help=f"all of {', '.join(SAMPLES)}")
     told = parser.parse_args()
     out = told.out.absolute()
     out.mkdir(parents=True, exist_ok=True)
-    bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.context.preferences.filepaths.save_version = 0
-    register()
+    for name in told.names or SAMPLES:
+        make(name, SAMPLES[name], told.engine, out)
+
+
+def make(name: str, sample: Sample, engine: str, out: Path) -> None:
+    """One sample: NAME.blend, its run, and blender-NAME.webp."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    if not hasattr(bpy.types.Object, "flowborne"):
+        register()
     scene = bpy.context.scene
     scene.frame_start, scene.frame_end = 1, 1 + PERIOD
-    armature = animal()
-    surroundings()
-    settings(armature)
-    bpy.ops.wm.save_as_mainfile(filepath=str(out / "tail.blend"))
-    picture(out / "blender-tail-before.webp")
-    run(told.engine)
+    rig = sample.character()
+    surroundings(sample)
+    settings(rig, sample)
+    bpy.ops.wm.save_as_mainfile(filepath=str(out / f"{name}.blend"))
+    halves = [picture(sample, out)]
+    job = start_job(bpy.context, engine)
+    finish(name, job)
     bpy.ops.flowborne.bake(bones="FREE")
+    if sample.ink:
+        job.start_export()
+        finish(name, job)
+        add_ink(bpy.context, job)
     bpy.ops.wm.save_mainfile(compress=True)
-    picture(out / "blender-tail-after.webp")
+    halves.append(picture(sample, out))
+    beside(halves, out / f"blender-{name}.webp")
 
 
-def animal() -> Any:
-    """The armature with its skin, and a cycle in which the body sways and the tail wags."""
-    armature = bpy.data.objects.new("animal", bpy.data.armatures.new("animal"))
-    bpy.context.scene.collection.objects.link(armature)
-    bpy.context.view_layer.objects.active = armature
-    bpy.ops.object.mode_set(mode="EDIT")
-    above = None
-    for number, (head, tail) in enumerate(pairwise(JOINTS)):
-        bone = armature.data.edit_bones.new(f"tail.{number}" if number else "body")
-        bone.head, bone.tail = (0.0, head, HEIGHT), (0.0, tail, HEIGHT)
-        bone.parent, above = above, bone
-    bpy.ops.object.mode_set(mode="OBJECT")
-    skin(armature)
-    limbs(armature)
-    for frame in range(1, 2 + PERIOD):
-        phase = 2.0 * pi * (frame - 1) / PERIOD
-        for number, bone in enumerate(armature.pose.bones):
-            bone.rotation_mode = "XYZ"
-            bone.rotation_euler = 0.02 * sin(phase), 0.0, 0.06 * sin(phase - 0.5 * number)
-            bone.keyframe_insert("rotation_euler", frame=frame)
-    return armature
-
-
-def skin(armature: Any) -> None:
-    """A closed tube of rings, bound to the bones."""
-    turns = [2.0 * pi * k / AROUND for k in range(AROUND)]
-    points = [(r * cos(a), y, HEIGHT + r * sin(a)) for y, r in PROFILE for a in turns]
-    starts = range(0, len(points) - AROUND, AROUND)
-    faces: list[tuple[int, ...]] = [
-        (ring + a, ring + AROUND + a, ring + AROUND + b, ring + b)
-        for ring in starts
-        for a, b in zip(range(AROUND), [*range(1, AROUND), 0], strict=True)
-    ]
-    last = len(points) - AROUND
-    faces += [tuple(range(AROUND)), tuple(range(len(points) - 1, last - 1, -1))]
-    mesh = bpy.data.meshes.new("skin")
-    mesh.from_pydata(points, [], faces)
-    mesh.shade_smooth()
-    body = bpy.data.objects.new("skin", mesh)
-    bpy.context.scene.collection.objects.link(body)
-    body.parent = armature
-    mesh.materials.append(paint("fur", FUR))
-    groups = [body.vertex_groups.new(name=bone.name) for bone in armature.data.bones]
-    for vertex, (_, y, _) in enumerate(points):
-        for number, group in enumerate(groups):
-            before = (y - JOINTS[number]) / 0.2 + 0.5 if number else 1.0
-            after = (JOINTS[number + 1] - y) / 0.2 + 0.5 if number < len(groups) - 1 else 1.0
-            share = min(1.0, before, after)
-            if share > 0.0:
-                group.add([vertex], share, "REPLACE")
-    body.modifiers.new("Armature", "ARMATURE").object = armature
-    body.modifiers.new("Smooth", "SUBSURF").levels = 1
-
-
-def limbs(armature: Any) -> None:
-    """Head, ears, eyes and legs, which move with the body and are not part of the run."""
-    fur, pale, dark = paint("coat", FUR), paint("pale", PALE), paint("dark", DARK)
-    parts = [
-        ((0.0, -0.12, 1.05), (0.23, 0.26, 0.21), fur),
-        ((0, -0.36, 0.99), (0.1, 0.14, 0.08), pale),
-    ]
-    for side in (-1.0, 1.0):
-        parts += [
-            ((0.13 * side, -0.06, 1.27), (0.06, 0.04, 0.14), fur),
-            ((0.1 * side, -0.31, 1.12), (0.03, 0.03, 0.04), dark),
-            ((0.15 * side, 0.3, 0.3), (0.07, 0.07, 0.32), fur),
-            ((0.15 * side, 0.95, 0.3), (0.07, 0.07, 0.32), fur),
-        ]
-    parts.append(((0.0, -0.5, 1.01), (0.035, 0.03, 0.03), dark))
-    for place, size, material in parts:
-        bpy.ops.mesh.primitive_uv_sphere_add(segments=16, ring_count=10, location=place)
-        part = bpy.context.object
-        part.scale = size
-        part.data.materials.append(material)
-        part.data.shade_smooth()
-        bpy.context.view_layer.update()
-        where = part.matrix_world.copy()
-        part.parent, part.parent_type, part.parent_bone = armature, "BONE", "body"
-        bpy.context.view_layer.update()
-        part.matrix_world = where
-
-
-def surroundings() -> None:
-    """Ground, sun, sky, camera, and a Wind field across the animal, with arrows along it."""
+def surroundings(sample: Sample) -> None:
+    """Sun, sky, camera and arrows along the flow; a ground and a Wind field where there is one."""
     scene = bpy.context.scene
-    bpy.ops.mesh.primitive_plane_add(size=60.0)
-    bpy.context.object.name = "ground"
-    bpy.context.object.data.materials.append(paint("ground", GROUND))
+    if sample.ground:
+        bpy.ops.mesh.primitive_plane_add(size=60.0)
+        bpy.context.object.data.materials.append(paint(sample.ground))
     bpy.ops.object.light_add(type="SUN", rotation=(radians(40.0), radians(-25.0), 0.0))
     bpy.context.object.data.energy = 2.2
     scene.world = bpy.data.worlds.new("sky")
     scene.world.use_nodes = True
     background = scene.world.node_tree.nodes["Background"]
-    background.inputs["Color"].default_value = (*SKY, 1.0)
-    bpy.ops.object.camera_add(location=(4.6, -2.4, 2.6))
+    background.inputs["Color"].default_value = (*sample.sky, 1.0)
+    place, target = sample.camera
+    bpy.ops.object.camera_add(location=place)
     scene.camera = bpy.context.object
     aim = bpy.data.objects.new("aim", None)
-    aim.location = 0.3, 1.2, 0.7
+    aim.location = target
     scene.collection.objects.link(aim)
-    look = scene.camera.constraints.new("TRACK_TO")
-    look.target = aim
-    bpy.ops.object.effector_add(type="WIND", location=(-1.5, 2.0, HEIGHT))
-    bpy.context.object.rotation_euler = 0.0, radians(90.0), 0.0
-    bpy.context.object.field.strength = 12.0
-    white = paint("arrow", (0.9, 0.9, 0.9))
-    for y in (1.7, 2.4, 3.1):
-        for shape, x, size in (
-            (bpy.ops.mesh.primitive_cylinder_add, -1.5, (0.02, 0.02, 0.3)),
-            (bpy.ops.mesh.primitive_cone_add, -1.1, (0.06, 0.06, 0.1)),
+    scene.camera.constraints.new("TRACK_TO").target = aim
+    across = (0.0, radians(90.0), 0.0) if sample.along[0] else (radians(-90.0), 0.0, 0.0)
+    if sample.wind:
+        bpy.ops.object.effector_add(type="WIND", location=sample.arrows[0], rotation=across)
+        bpy.context.object.field.strength = sample.wind
+    size = float(np.linalg.norm(np.subtract(place, target))) / 6.0
+    for start in sample.arrows:
+        for shape, forward, scale in (
+            (bpy.ops.mesh.primitive_cylinder_add, 0.0, (0.02, 0.02, 0.3)),
+            (bpy.ops.mesh.primitive_cone_add, 0.4, (0.06, 0.06, 0.1)),
         ):
-            shape(location=(x, y, HEIGHT), rotation=(0.0, radians(90.0), 0.0))
-            bpy.context.object.scale = size
-            bpy.context.object.data.materials.append(white)
+            shape(location=np.add(start, size * forward * np.array(sample.along)), rotation=across)
+            bpy.context.object.scale = size * np.array(scale)
+            bpy.context.object.data.materials.append(paint((0.9, 0.9, 0.9)))
 
 
-def settings(armature: Any) -> None:
+def settings(rig: Any, sample: Sample) -> None:
     """What an animator sets in the panel."""
-    bpy.context.view_layer.objects.active = armature
-    bpy.ops.flowborne.preset(kind="TAIL")
-    for bone in armature.pose.bones:
+    bpy.context.view_layer.objects.active = rig
+    bpy.ops.flowborne.preset(kind=sample.preset)
+    for bone in rig.pose.bones:
         if bone.select:
             for axis in "xyz":
                 setattr(bone, f"use_ik_limit_{axis}", True)
-                setattr(bone, f"ik_min_{axis}", radians(-30.0))
-                setattr(bone, f"ik_max_{axis}", radians(30.0))
-    chosen = armature.flowborne
-    chosen.wind = next(
-        each for each in bpy.data.objects if each.field is not None and each.field.type == "WIND"
-    )
-    chosen.density, chosen.rounds, chosen.strength = 60.0, 4, radians(180.0)
-    chosen.follow = 0.05
+                setattr(bone, f"ik_min_{axis}", radians(-sample.limit))
+                setattr(bone, f"ik_max_{axis}", radians(sample.limit))
+    if sample.wind:
+        fields = (each for each in bpy.data.objects if each.field and each.field.type == "WIND")
+        rig.flowborne.wind = next(fields)
+    if sample.ink:
+        centre, size = sample.ink
+        bpy.ops.mesh.primitive_cube_add(size=1.0, location=centre, scale=size)
+        bpy.context.object.hide_render = True
+        rig.flowborne.ink = bpy.context.object
+        bpy.context.view_layer.objects.active = rig
+    for name, value in sample.settings.items():
+        setattr(rig.flowborne, name, value)
 
 
-def run(engine: str) -> None:
-    """Run to the end, and say how long it took."""
+def finish(name: str, job: Job) -> None:
+    """Wait for the end of a job, and say how long it took."""
     began = time.monotonic()
-    job = start_job(bpy.context, engine)
-    while job.step() not in IDLE:
+    while job.active:
         time.sleep(0.1)
-    if job.state is not State.DONE:
+        job.step()
+    if not job.complete:
         raise SystemExit(job.message)
-    print(f"{job.reaction.frames} frames in {time.monotonic() - began:.0f} s")
+    print(f"{name}: {job.line}, {time.monotonic() - began:.0f} s")
 
 
-def paint(name: str, colour: tuple[float, float, float]) -> Any:
-    """A matt material."""
-    material = bpy.data.materials.new(name)
-    material.use_nodes = True
-    shader = material.node_tree.nodes["Principled BSDF"]
-    shader.inputs["Base Color"].default_value = (*colour, 1.0)
-    shader.inputs["Roughness"].default_value = 0.7
-    return material
-
-
-def picture(path: Path) -> None:
-    """One frame by Cycles, on processors alone."""
+def picture(sample: Sample, out: Path) -> np.ndarray:
+    """(height, width, 4) one frame by Cycles, on processors alone."""
     scene = bpy.context.scene
-    scene.frame_set(PICTURED)
+    scene.frame_set(sample.pictured)
     scene.render.engine = "CYCLES"
     scene.view_settings.view_transform = "Standard"
     scene.cycles.samples, scene.cycles.use_denoising = 32, True
-    scene.render.resolution_x, scene.render.resolution_y = 800, 450
-    scene.render.image_settings.file_format, scene.render.image_settings.quality = "WEBP", 80
-    scene.render.filepath = str(path)
+    scene.render.resolution_x, scene.render.resolution_y = SIZE
+    scene.render.filepath = str(out / "half.png")
     bpy.ops.render.render(write_still=True)
+    image = bpy.data.images.load(scene.render.filepath)
+    pixels = np.array(image.pixels[:]).reshape(SIZE[1], SIZE[0], 4)
+    bpy.data.images.remove(image)
+    Path(scene.render.filepath).unlink()
+    return pixels
+
+
+def beside(halves: list[np.ndarray], path: Path) -> None:
+    """Write pictures next to each other as one."""
+    whole = bpy.data.images.new("whole", 2 * SIZE[0], SIZE[1])
+    whole.pixels = np.concatenate(halves, axis=1).ravel().tolist()
+    whole.file_format = "WEBP"
+    whole.save(filepath=str(path), quality=85)
 
 
 if __name__ == "__main__":

@@ -28,12 +28,17 @@ def some(count: int, seed: int) -> np.ndarray:
     return Rotation.random(count, random_state=seed).as_matrix()
 
 
+def motion(names: tuple[str, ...], position: np.ndarray, rotation: np.ndarray) -> Motion:
+    """A run whose forces are along the y axes of the bones."""
+    return Motion(names, names, position, rotation, position, rotation[..., 1])
+
+
 def test_places_in_the_armature() -> None:
     """World = armature's place, with its scale, times the place in the armature, without one."""
     places, rotation = np.tile(np.eye(4), (FRAMES, 1, 1)), some(FRAMES, 1)
     places[:, :3, :3], places[:, :3, 3] = 2.5 * some(FRAMES, 5), np.arange(FRAMES)[:, None]
     head = np.random.default_rng(6).normal(size=(FRAMES, 3))
-    run = Motion(("root",), ("root",), 0.1 * head[:, None], rotation[:, None])
+    run = motion(("root",), 0.1 * head[:, None], rotation[:, None])
     inner = run.in_armature("root", 0.1, places)
     assert_allclose((places @ inner)[:, :3, 3], head, atol=1e-12)
     assert_allclose((places @ inner)[:, :3, :3], 2.5 * rotation, atol=1e-12)
@@ -103,10 +108,12 @@ def test_the_last_round_is_moved_to_the_first() -> None:
     position = np.concatenate([position, position @ stride.T + shift_of])
     rotation[7, 1] = rotation[7, 0] @ rotation[4, 0].T @ rotation[4, 1]
     rotation[7, 1] = rotation[7, 1] @ Rotation.from_euler("y", 10, degrees=True).as_matrix()
-    run = Motion(("root", "tail"), ("root", "tail"), position, rotation)
+    run = motion(("root", "tail"), position, rotation)
     last = run.after(4, loop=True)
     assert_allclose(last.rotation[:3], run.rotation[:3], atol=1e-12)
     assert_allclose(last.position, run.position[:4], atol=1e-12)
+    assert_allclose(last.centre, run.centre[:4], atol=1e-12)
+    assert_allclose(last.force[:3], run.force[:3], atol=1e-12)
     assert last.ends_apart(["root", "tail"]) == pytest.approx(10.0)
     assert_allclose(run.after(4, loop=False).rotation, run.rotation[4:])
     with pytest.raises(MotionError, match="the run has 7 frames, and the bake starts after 8"):

@@ -73,7 +73,7 @@ assert [bone.name for bone in rig.pose.bones if bone.select] == ["tweak_tail"]
 select(rig, "tip")
 said = message(ReactionError, reaction_of, bpy.context, rig, rig.flowborne)
 assert "bone 'tip' deforms nothing" in said, said
-select(rig, "tweak_tail", "DEF-tip")
+select(rig, "tweak_tail", "tweak_tip", "ORG-tip")  # the last is hidden
 assert [bone.name for bone in selected_bones(rig)] == ["DEF-tail", "DEF-tip"]
 rig.flowborne.density = 60.0
 job = start_job(bpy.context, os.environ["FLOWBORNE_ENGINE"])
@@ -108,6 +108,7 @@ assert away["DEF-tail"] > 1.0, away
 bpy.ops.object.armature_wolf_metarig_add()
 bpy.ops.pose.rigify_generate()
 rig = bpy.context.object
+rig.data.collections["DEF"].is_visible = True
 select(rig, "DEF-spine.001")
 said = message(ReactionError, reaction_of, bpy.context, rig, rig.flowborne)
 assert "'DEF-spine.001' hangs on control 'MCH-torso.parent'" in said, said

@@ -1,6 +1,7 @@
 """The runs of an armature are listed, one is chosen, and a new run takes a free number."""
 
 import shutil
+import time
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -44,6 +45,11 @@ python = FOLDER / "python"
 python.write_text("#!/bin/sh\nexit 1\n")
 python.chmod(0o755)
 job = start_job(bpy.context, str(python))
-job.close()
+until = time.monotonic() + 60.0
+while job_of(
+    rig.flowborne, ""
+).active:  # looked after by the panel, as after another file is opened
+    assert time.monotonic() < until
+assert job.line == "it ended with code 1"
 assert job.folder == above / "rig-11"
 assert rig.flowborne.folder == "//shot-flowborne/rig-11"

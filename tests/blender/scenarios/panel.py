@@ -48,6 +48,7 @@ assert "resolution" in drawn()
 run = recorded(rig)
 assert "done, frame 11/11" in drawn()
 job = job_of(rig.flowborne, "")
+(run / "states" / "000011.npz").unlink()
 for state, shown in (
     (State.RUNNING, "flowborne.cancel"),
     (State.CANCELLED, "Resume"),

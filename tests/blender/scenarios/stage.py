@@ -205,11 +205,18 @@ def recorded(
             job / "run" / "states" / f"{k:06}.npz",
             body_position=body_position.astype(np.float32),
             body_rotation=body_rotation.astype(np.float32),
+            fluid_centre=body_position.astype(np.float32),
+            fluid_force=force_on(k).astype(np.float32),
         )
     rate = scene.render.fps / scene.render.fps_base
     Reaction(tuple(free), {}, scene.frame_start, frames - 1, rate, unit).save(job / "job.json")
     armature.flowborne.folder = str(job)
     return job / "run"
+
+
+def force_on(frame: int) -> np.ndarray:
+    """(4, 3) N on the world and the bodies of a recorded run; none on the world and the trunk."""
+    return np.outer([0.0, 0.0, 1.0, 2.0], [1.0, 0.1 * frame, -0.5])
 
 
 def bake(armature: Any, bones: str = "FREE") -> Any:
