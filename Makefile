@@ -12,7 +12,7 @@ BPY_VENV := build/bpy-$(BPY)
 # Every process would compile the package anew, a fifth of what it takes to start.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: baselines bench-history bench-pages blender blender-sample browser chapters clean closeness demo dist docs exporters films fuzz gallery gltf-validator imports joss lint messages notebooks paper readme same-figures size speed strangers test validation-page workflows
+.PHONY: baselines bench-history bench-pages blender blender-sample browser chapters clean closeness demo dist docs exporters films fuzz gallery gltf-validator imports joss lint messages notebooks paper readme recordings same-figures size speed strangers test validation-page workflows
 
 demo: $(VENV)/installed
 	$(BIN)/flowborne run ns-block-drag-max --out runs/ns-block-drag-max --replace
@@ -78,6 +78,9 @@ paper: $(VENV)/installed-test
 
 readme: $(VENV)/installed-test
 	$(BIN)/python tools/readme.py
+
+recordings: $(VENV)/installed-test
+	$(BIN)/python tools/recordings.py $(NAMES)
 
 validation-page: $(VENV)/installed-test
 	$(BIN)/python tools/validation_page.py

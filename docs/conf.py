@@ -31,6 +31,7 @@ python_maximum_signature_line_length = 80
 html_theme = "furo"
 html_static_path = ["static"]
 html_css_files = ["handbook.css"]
+html_js_files = ["turn.js"]
 html_math_renderer = "mathml"
 html_copy_source = False
 html_show_sphinx = False

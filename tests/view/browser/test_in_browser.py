@@ -213,3 +213,22 @@ def test_a_walker_that_is_played_leans_the_other_way(browser: Any, tmp_path: Pat
     print(f"leaning {before:.1f}° before the wind turned, {after:.1f}° a second of the walk later")
     assert before > 3.0
     assert after < -3.0
+
+
+def test_a_recorded_run_turns_without_a_server(browser: Any, tmp_path: Path) -> None:
+    """A card of the front page of the documentation, from a disc."""
+    static = Path(__file__).parents[3] / "docs" / "static"
+    (tmp_path / "index.html").write_text(
+        f'<script src="{(static / "turn.js").as_uri()}"></script><ul id="runs-to-turn"><li>'
+        '<a href="#"><img alt="A fish"></a><code>flowborne run fish-robot</code></li></ul>',
+        encoding="utf-8",
+    )
+    page, asked = browser.new_page(viewport={"width": 390, "height": 844}), []
+    page.on("request", lambda request: asked.append(request.url))
+    page.goto((tmp_path / "index.html").as_uri())
+    assert [url.rsplit("/", 1)[1] for url in asked] == ["index.html", "turn.js"]
+    page.get_by_role("button", name="Turn: A fish").click()
+    page.wait_for_function("document.querySelector('model-viewer')?.currentTime > 0.2")
+    assert page.evaluate("document.querySelector('model-viewer').duration") == pytest.approx(4.0)
+    assert {url.partition(":")[0] for url in asked} <= {"file", "blob", "data"}
+    page.close()
