@@ -14,6 +14,7 @@ from flowborne.base.errors import SceneError
 from flowborne.scenes import warn_units
 from flowborne.scenes.build import build
 from flowborne.scenes.load import load_scene, scene_names
+from flowborne.scenes.notes import notes_of
 from flowborne.scenes.warn import WARNINGS, warnings_of
 
 MODEL = """
@@ -111,9 +112,12 @@ def test_numbers_in_another_unit(swung: Swung, new: dict[str, str], expected: st
     assert expected in warnings[0]
 
 
-def test_a_scene_in_the_centimetres_of_its_model_is_in_no_other_unit(swung: Swung) -> None:
-    warnings = said(swung(IN_CENTIMETRES | {"0, -9.81]": "0, -981.0]"}))
-    assert not any("arm.xml has a gravity" in warning for warning in warnings)
+def test_a_scene_in_the_centimetres_of_its_model_is_not_compared_with_metres(swung: Swung) -> None:
+    """Its density of 0.5 g/cm^3 is none of foam, and a note says why."""
+    scene = swung(IN_CENTIMETRES | {"0, -9.81]": "0, -981.0]", "density = 500.0": "density = 0.5"})
+    setup = build(scene).world.setup
+    assert [w for w in warnings_of(scene, setup) if "[time]" not in w] == []
+    assert any("the scene is taken to be in cm" in note for note in notes_of(scene, setup.solid))
 
 
 def test_a_grain_in_kilometres(swung: Swung) -> None:

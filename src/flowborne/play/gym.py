@@ -266,19 +266,17 @@ class SceneEnv(gymnasium.Env):  # type: ignore[name-defined]
         wanted = self._low + part * (self._high - self._low)
         commands, first = dict[str, Command](), 0
         make = {"velocity": Velocity, "position": Position, "torque": Torque}[self._kind]
+        model = self.simulation.setup.solid
         for joint in self._joints:
-            count = self.simulation.setup.solid.dofs_of(joint).size
+            count = model.dofs_of(joint).size
             commands[joint] = make(wanted[first : first + count])
             first += count
         for name in self._actuators:
-            count = control_range(self.simulation.setup.solid, self._number(name))[0].size
+            count = control_range(model, model.actuator(name))[0].size
             commands[name] = Control(wanted[first : first + count])
             first += count
         commands |= zip(self._thrusters, map(Control, wanted[first:].tolist()), strict=True)
         return commands
-
-    def _number(self, actuator: str) -> int:
-        return self.simulation.setup.solid.actuator(actuator)
 
     def _observed(self) -> dict[str, float]:
         """The numbers of an observation by their names."""

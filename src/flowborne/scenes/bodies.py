@@ -46,6 +46,9 @@ from flowborne.solids.trajectories import (
     driven,
 )
 
+CENTIMETRES = 970.0, 990.0
+"""cm/s^2, about gravity on the Earth (978 to 983)."""
+
 MODEL = "gravity", "dimensions", "plugins", "solids", "shapes", "flesh", "human", "clip", "earlier"
 """Keys of a scene on which its model depends."""
 
@@ -244,6 +247,19 @@ def check_initial(draft: Draft, around: Surroundings) -> Iterator[str]:
                 )
             elif key == "positions" and kind in (BALL, FREE) and not any(numbers[-4:]):
                 yield f"{where}: the quaternion of joint '{joint}' is 0. Give (1, 0, 0, 0) or so."
+
+
+def gravity_in_centimetres(scene: Scene) -> float:
+    """The gravity of the model file if it is the Earth's in cm/s^2, else 0."""
+    if scene.model_path is None or scene.solids is None:
+        return 0.0
+    own = float(np.linalg.norm(spec_of(scene).option.gravity))
+    return own if CENTIMETRES[0] < own < CENTIMETRES[1] else 0.0
+
+
+def in_centimetres(scene: Scene) -> bool:
+    """Whether a scene is in cm, g and s: with the gravity of a model that is."""
+    return gravity_in_centimetres(scene) == float(np.linalg.norm(scene.gravity)) != 0.0
 
 
 def with_steps(scene: Scene) -> Scene:

@@ -22,6 +22,7 @@ from flowborne.motion.human.skeleton import PARENTS
 from flowborne.scenes.bodies import (
     given_of,
     held_joints,
+    in_centimetres,
     left_free,
     own_pose,
     posed,
@@ -62,6 +63,11 @@ def notes_of(scene: Scene, model: SolidModel) -> Iterator[str]:
     yield from _creeping(scene)
     if scene.dye and scene.film.field != "dye":
         yield (f'[[dye]]: the film shows {scene.film.field}; [film] field = "dye" shows the dye')
+    if in_centimetres(scene):
+        yield (
+            "gravity: it is the Earth's in cm/s^2, in the model as well, so the scene is taken to "
+            "be in cm, g and s, and no warning compares it with metres and kilograms"
+        )
     steps = scene.time.steps_per_frame
     if steps > 1 and steps == steps_of_contacts(scene, model):
         yield (

@@ -17,7 +17,7 @@ from flowborne.control.objective_kinds import ObjectiveInputMotionTable
 from flowborne.coupling.world import TRIAL_TOLERANCE, Setup
 from flowborne.motion.clip_reading import MIN_STANDING_COSINE, standing_axis
 from flowborne.motion.tracks import SPEED_SAMPLES
-from flowborne.scenes.bodies import bones_of, held_joints, left_free, undriven
+from flowborne.scenes.bodies import bones_of, held_joints, in_centimetres, left_free, undriven
 from flowborne.scenes.build import surroundings_of
 from flowborne.scenes.capture import capture_of
 from flowborne.scenes.flesh import staleness
@@ -215,10 +215,23 @@ KINDS: dict[str, Warn] = {warn.__name__: warn for warn in WARNINGS}
 """Name of each kind, as in [accepted_warnings]."""
 
 
+IN_METRES: tuple[Warn, ...] = (
+    sizes,
+    gravity,
+    winds,
+    densities_alone,
+    implausible_density,
+    mass_apart,
+)
+"""Those that compare a scene with the world in m and kg."""
+
+
 def warnings_of(scene: Scene, setup: Setup) -> list[str]:
     """All warnings about a scene that it does not accept, the same before, during and after a
     run."""
     kinds = [warn for kind, warn in KINDS.items() if kind not in scene.accepted_warnings]
+    if in_centimetres(scene):
+        kinds = [warn for warn in kinds if warn not in IN_METRES]
     return [warning for warn in kinds for warning in warn(scene, setup)]
 
 

@@ -12,7 +12,7 @@ from flowborne.base.phrases import and_more, listed
 from flowborne.base.tables import MOST_STEPS
 from flowborne.coupling.world import Setup
 from flowborne.kernels.arrays import Array, Integers
-from flowborne.scenes.bodies import initial_state, spec_of
+from flowborne.scenes.bodies import CENTIMETRES, gravity_in_centimetres, initial_state
 from flowborne.scenes.capture import capture_of
 from flowborne.scenes.creature import creature_extent
 from flowborne.scenes.schema import Scene
@@ -32,9 +32,6 @@ SMALLEST_PERSON, HEAVIEST_PERSON = 1.0, 635.0
 
 STRONGEST_GRAVITY = 274.0
 """m/s^2 on the Sun. On the Earth it is 9810 mm/s^2."""
-
-CENTIMETRES = 970.0, 990.0
-"""cm/s^2, about gravity on the Earth (978 to 983)."""
 
 STRONGEST_WIND = 113.0
 """m/s, the strongest gust on record (WMO: Barrow Island, 1996). That is 408 km/h."""
@@ -119,11 +116,9 @@ def gravity(scene: Scene, setup: Setup) -> Iterator[str]:
 
 
 def model_in_centimetres(scene: Scene, setup: Setup) -> Iterator[str]:
-    """A model whose own gravity is the Earth's in cm/s^2, in a scene with another one."""
-    if scene.model_path is None or scene.solids is None:
-        return
-    own, given = (float(np.linalg.norm(g)) for g in (spec_of(scene).option.gravity, scene.gravity))
-    if CENTIMETRES[0] < own < CENTIMETRES[1] and own != given:
+    """A model in cm and g in a scene with another gravity."""
+    if (own := gravity_in_centimetres(scene)) and own != float(np.linalg.norm(scene.gravity)):
+        assert scene.model_path is not None
         yield (
             f"[solids]: {scene.model_path.name} has a gravity of {own:g}, the Earth's in cm/s^2, "
             "so its sizes are in cm and its masses in g; a scene all in cm, g and s fits it "
