@@ -159,7 +159,7 @@ def test_a_chain_of_kernels_becomes_machine_code_once():
     finally:
         hooks = library._object_compiled_hook, library._object_getbuffer_hook
         codegen._engine.set_object_cache(*hooks)
-    assert made == ["sum_of_roots"]
+    assert {"positive", "both_positive", "sum_of_roots"}.intersection(made) == {"sum_of_roots"}
 
 
 def test_what_a_kernel_of_a_kernel_raises_has_its_values():

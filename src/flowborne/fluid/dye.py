@@ -167,8 +167,8 @@ class Passage:
         ring = self.sides.periodic()[axis] and not any(within)
         flux, (x, y, z) = self.transport.flux[axis], box
         corners = (x.start, y.start, z.start), (x.stop, y.stop, z.stop)
-        given = flux, self.clear, corners, order_along(axis, grid)
-        crossed = sweep(*fields, *given, ends, ring, self.dt, bounds)
+        order = order_along(axis, grid)
+        crossed = sweep(*fields, flux, self.clear, corners, order, ends, ring, self.dt, bounds)
         return float(crossed[0].sum() - crossed[1].sum())
 
     def bounds(self, name: str, values: Array) -> Bounds:
