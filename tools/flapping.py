@@ -231,7 +231,7 @@ def write(python: Path) -> None:
     """Run the wing in both programs, and write what they give."""
     rooms = {f"{k:g}": {str(cells): room(k, cells) for cells in GRIDS} for k in WING.reduced}
     found = {"version": fb.__version__, "lattice": lattice(python), "rooms": rooms}
-    FOUND.write_text(json.dumps(rounded(found), indent=1) + "\n", encoding="utf-8")
+    FOUND.write_text(json.dumps(rounded(found)) + "\n", encoding="utf-8")
     draw(found)
 
 
