@@ -12,7 +12,7 @@ BPY_VENV := build/bpy-$(BPY)
 # Every process would compile the package anew, a fifth of what it takes to start.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: baselines bench-history bench-pages blender blender-sample browser chapters clean closeness demo dist docs exporters films fuzz gallery gltf-validator imports joss lint messages notebooks paper readme recordings same-figures size speed strangers test validation-page workflows
+.PHONY: baselines bench-history bench-pages blender blender-sample browser chapters clean closeness cross-checks demo dist docs exporters films fuzz gallery gltf-validator imports joss lint messages notebooks paper readme recordings same-figures size speed strangers test validation-page workflows
 
 demo: $(VENV)/installed
 	$(BIN)/flowborne run ns-block-drag-max --out runs/ns-block-drag-max --replace
@@ -110,6 +110,13 @@ messages: $(VENV)/installed-test
 
 closeness: $(VENV)/installed-test
 	$(BIN)/python tools/closeness.py
+
+cross-checks: $(VENV)/installed-test
+	test -x build/ptera/bin/python || $(PYTHON) -m venv build/ptera
+	build/ptera/bin/python -m pip install --quiet pterasoftware
+	NUMBA_NUM_THREADS=1 $(BIN)/python tools/flapping.py build/ptera/bin/python
+	NUMBA_NUM_THREADS=1 $(BIN)/python tools/heaving.py
+	NUMBA_NUM_THREADS=1 $(BIN)/python tools/waterlily.py
 
 baselines: $(VENV)/installed-test
 	$(BIN)/python tools/baselines.py $(NAMES)

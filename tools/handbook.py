@@ -24,11 +24,14 @@ import accuracy
 import api_pages
 import citation
 import command_help
+import flapping
+import heaving
 import notebooks
 import parts
 import scene_keys
 import symbols
 import validation_table
+import waterlily
 from docstrings import entries, paragraphs
 from flowborne.scenes.json_schema import json_schema
 
@@ -39,11 +42,14 @@ MAKERS = {
         api_pages,
         citation,
         command_help,
+        flapping,
+        heaving,
         notebooks,
         parts,
         scene_keys,
         symbols,
         validation_table,
+        waterlily,
     )
 }
 """Modules whose functions give parts of pages. They are imported before autodoc imports anything:
