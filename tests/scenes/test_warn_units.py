@@ -72,7 +72,7 @@ def test_no_built_in_scene_is_in_another_unit(name: str) -> None:
     scene = load_scene(name)
     setup = build(scene).world.setup
     kinds = [kind for kind in WARNINGS if kind.__module__ == warn_units.__name__]
-    assert len(kinds) == 8
+    assert len(kinds) == 9
     assert [w for kind in kinds for w in kind(scene, setup)] == []
 
 

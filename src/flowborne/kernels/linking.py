@@ -24,7 +24,7 @@ class Linked(JITCodeLibrary):
 
     @property
     def codegen(self) -> Any:
-        """Takes the function's environment, which belongs to machine code: see `KernelCompiler`."""
+        """Takes the function's environment, which belongs to machine code: see `Linking`."""
         return SimpleNamespace(set_env=lambda name, environment: None)
 
     def _optimize_final_module(self) -> None:
@@ -40,7 +40,7 @@ class Linked(JITCodeLibrary):
         return 0
 
 
-class KernelCompiler(Compiler):
+class Linking(Compiler):
     """Numba's own, but for functions without an entry from Python."""
 
     def compile_extra(self, func: FunctionType) -> Any:
@@ -55,3 +55,12 @@ class KernelCompiler(Compiler):
         for environment in result._find_referenced_environments():
             result.library.codegen.set_env(environment.env_name, environment)
         return result
+
+
+PARTS = "_optimize_final_module", "_finalize_final_module", "_finalize_dynamic_globals"
+"""Methods of Numba's that `Linked` replaces or calls, in 0.61 to 0.68."""
+
+KernelCompiler: type[Compiler] = (
+    Linking if all(hasattr(JITCodeLibrary, part) for part in PARTS) else Compiler
+)
+"""A Numba of other parts compiles as it does by itself: the same code, later."""
