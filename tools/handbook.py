@@ -31,6 +31,7 @@ import parts
 import scene_keys
 import symbols
 import validation_table
+import viewer_script
 import waterlily
 from docstrings import entries, paragraphs
 from flowborne.scenes.json_schema import json_schema
@@ -172,16 +173,19 @@ class Diagram(SphinxDirective):
         ]
 
 
-def published_schema(app: Sphinx, error: Exception | None) -> None:
-    """Put the JSON schema of scenes beside the pages."""
+def published(app: Sphinx, error: Exception | None) -> None:
+    """Put the JSON schema of scenes beside the pages, and what recorded runs are turned with."""
     if error is None:
+        out = Path(app.outdir)
         text = json.dumps(json_schema(), indent=2)
-        (Path(app.outdir) / "scene.schema.json").write_text(text, encoding="utf-8")
+        (out / "scene.schema.json").write_text(text, encoding="utf-8")
+        script = out / "_static" / "turn" / "three.js"
+        script.write_text(viewer_script.three(), encoding="utf-8")
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
     app.connect("source-read", made_parts)
-    app.connect("build-finished", published_schema)
+    app.connect("build-finished", published)
     app.connect("autodoc-process-docstring", structured)
     app.connect("autodoc-process-signature", readable)
     app.connect("autodoc-skip-member", skipped)

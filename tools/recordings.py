@@ -34,18 +34,18 @@ class Recording:
     """The run of a built-in scene.
 
     frames    of the run
-    orbit     where the camera is at first: angle about the vertical, angle from it
+    angles    of the camera at first, in degrees: from the vertical and about it
     settings  changes of the scene, as those of `--set`
     """
 
     frames: int
-    orbit: str = "30deg 70deg"
+    angles: tuple[float, float] = (70.0, 30.0)
     settings: Mapping[str, str] = field(default_factory=dict)
 
 
 RECORDINGS = {
-    "eel": Recording(240, "0deg 25deg"),
-    "human-wind-back": Recording(96, "10deg 75deg"),
+    "eel": Recording(240, (25.0, 0.0)),
+    "human-wind-back": Recording(96, (75.0, 10.0)),
     "flyer-twist": Recording(270, settings={"domain.resolution": "24"}),
     "fish-robot": Recording(144),
     "swimmer": Recording(
@@ -70,9 +70,9 @@ def script(name: str, glb: bytes) -> str:
     """A script that hands a run and its framing to turn.js."""
     target, distance = framing(GLTF2.load_from_bytes(glb))
     entry = {
-        "target": " ".join(f"{x:.3g}m" for x in target),
-        "orbit": f"{RECORDINGS[name].orbit} {distance:.3g}m",
-        "farthest": f"auto auto {2.0 * distance:.3g}m",
+        "target": [round(float(x), 4) for x in target],
+        "angles": [round(float(x), 4) for x in np.radians(RECORDINGS[name].angles)],
+        "distance": round(distance, 4),
         "glb": b64encode(gzip.compress(glb, 9, mtime=0)).decode(),
     }
     return f"(window.recordedRuns ??= {{}})[{json.dumps(name)}] = {json.dumps(entry)};\n"
