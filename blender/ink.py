@@ -13,8 +13,8 @@ from .motion import read_motion
 
 NAME = "flowborne ink"
 
-DENSITY = 40.0
-"""Density of the material where the flow is all ink."""
+DENSITY = 20.0
+"""Density of the material where the flow is all ink, 1/m."""
 
 
 def add_ink(context: Any, job: Job) -> Any:
@@ -33,25 +33,26 @@ def add_ink(context: Any, job: Job) -> Any:
     volume.frame_start = reaction.first - reaction.lead + skipped
     volume.frame_offset = skipped - 1  # the first file has number 0
     volume.frame_duration = job.frames_done + 1 - skipped
+    volume.grids.load()  # or there is no grid of this name
     volume.velocity_grid = "velocity"
     thing = bpy.data.objects.new(NAME, volume)
     thing.matrix_world = Matrix.Diagonal((1.0 / unit,) * 3).to_4x4() @ Matrix.LocRotScale(
         shift, Matrix(turn), None
     )
-    volume.materials.append(_material())
+    volume.materials.append(_material(unit))
     context.scene.collection.objects.link(thing)
     return thing
 
 
-def _material() -> Any:
-    """A material that is dark where there is ink."""
+def _material(unit: float) -> Any:
+    """A material that is dark where there is ink; `unit` is m per unit of Blender."""
     material = bpy.data.materials.new(NAME)
     material.use_nodes = True
     nodes = material.node_tree.nodes
     nodes.clear()
     ink = nodes.new("ShaderNodeVolumePrincipled")
     ink.inputs["Density Attribute"].default_value = "dye"
-    ink.inputs["Density"].default_value = DENSITY
+    ink.inputs["Density"].default_value = DENSITY * unit
     ink.inputs["Color"].default_value = 0.1, 0.02, 0.15, 1.0
     output = nodes.new("ShaderNodeOutputMaterial")
     material.node_tree.links.new(ink.outputs["Volume"], output.inputs["Volume"])

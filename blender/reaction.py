@@ -112,8 +112,8 @@ class Reaction:
         """The settings from a file of `save`. Raises ReactionError when it cannot be read."""
         try:
             found = json.loads(path.read_text(encoding="utf-8"))
-            lists = {key: tuple(found[key]) for key in ("bones", "flow", "gravity", "ink")}
-            return cls(**found | lists)
+            lists = {key: tuple(found[key]) for key in ("bones", "flow", "gravity")}
+            return cls(**found | lists | {"ink": tuple(map(tuple, found.get("ink", ())))})
         except (OSError, ValueError, TypeError, KeyError) as error:
             raise ReactionError(f"{path} cannot be read ({error}): start a new run") from error
 

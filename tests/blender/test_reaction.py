@@ -49,7 +49,11 @@ def test_simulated_water(imported: Path) -> None:
         assert scene.clip.free == ("handle",)
         step = 1.0 / 24.0 / scene.time.steps_per_frame
         assert 5.0 * step <= scene.domain.spacing()
+        assert not scene.dye
     assert scenes[1].time.steps_per_frame >= 4 * scenes[0].time.steps_per_frame - 4
+    box = (-0.1, 0.0, 0.0), (0.1, 0.2, 0.2)
+    (ink,) = fb.load_scene(write_scene(imported, replace(water, ink=box))).dye
+    assert (ink.kind, ink.lower, ink.upper) == ("box", *box)
 
 
 @pytest.mark.parametrize("simulated", [False, True])
@@ -88,8 +92,9 @@ def test_settings_are_checked_and_kept(tmp_path: Path) -> None:
     ):
         with pytest.raises(ReactionError, match=said):
             replace(PLAIN, **wrong)
-    PLAIN.save(tmp_path / "job.json")
-    assert Reaction.load(tmp_path / "job.json") == PLAIN
+    for reaction in (PLAIN, replace(PLAIN, ink=((0.0, 0.0, 0.0), (1.0, 1.0, 1.0)))):
+        reaction.save(tmp_path / "job.json")
+        assert Reaction.load(tmp_path / "job.json") == reaction
     (tmp_path / "job.json").write_text("{}")
     with pytest.raises(ReactionError, match=r"job\.json cannot be read .*: start a new run"):
         Reaction.load(tmp_path / "job.json")

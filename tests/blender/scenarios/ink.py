@@ -76,6 +76,7 @@ def check() -> None:
     (thing,) = (each for each in bpy.data.objects if each.type == "VOLUME")
     assert volume.filepath.startswith("//shot-flowborne")
     assert volume.grids.load()
+    assert volume.velocity_grid == "velocity"
     assert {"dye", "velocity"} <= {grid.name for grid in volume.grids}
     assert thing.active_material.node_tree.nodes["Principled Volume"]
     for frame in (10, 11, 13):
