@@ -56,7 +56,8 @@ def test_sweep(
     arrays = field, volume, flux, clear
     around = [np.pad(a, 1).transpose(np.argsort(order)).copy() for a in arrays]
     x, y, z = (1 + shape[order.index(axis)] for axis in range(3))
-    crossed = sweep(*around, ((1, 1, 1), (x, y, z)), order, ends, wraps, 0.9, bounds)
+    box = (1, 1, 1), (x, y, z), order
+    crossed = sweep((around[0], around[1]), *around[2:], box, ends, wraps, 0.9, bounds)
     carried = [np.pad(a, 1).transpose(np.argsort(order)) for a in expected[:2]]
     for given, value in zip((*around[:2], crossed), (*carried, expected[2]), strict=True):
         np.testing.assert_allclose(given, value, atol=1e-14)
@@ -71,8 +72,8 @@ def test_means_of_a_parabola_are_carried_exactly(courant: float) -> None:
     field = np.diff(whole).reshape(1, 12, 1)
     flux = np.full((1, 13, 1), courant)
     clear, ends = np.ones(field.shape, np.uint8), np.zeros((2, 1, 1))
-    box = (0, 0, 0), (1, 12, 1)
-    sweep(field, np.ones(field.shape), flux, clear, box, (0, 1, 2), ends, False, 1.0, NEVER)
+    box = (0, 0, 0), (1, 12, 1), (0, 1, 2)
+    sweep((field, np.ones(field.shape)), flux, clear, box, ends, False, 1.0, NEVER)
     moved = x[3:10] - courant
     exact = np.diff(2.0 * moved + 3.0 * moved**2 + 0.1 * moved**3 / 3.0)
     np.testing.assert_allclose(field[0, 3:9, 0], exact, rtol=1e-13)

@@ -74,7 +74,7 @@ ONE_FAULT = {
     "a number that is text": (
         {"strength = 20.0": 'strength = "20"'},
         "scene swim.toml, [[control]] 1, strength: '20' is not a number. "
-        "Give a number without quotes.",
+        "Give a number, without quotes.",
     ),
     "a boundary that does not exist": (
         {'x_max = "open"': 'x_max = "opn"'},

@@ -166,9 +166,9 @@ class Passage:
         ends[np.array(within)] = 0.0
         ring = self.sides.periodic()[axis] and not any(within)
         flux, (x, y, z) = self.transport.flux[axis], box
-        corners = (x.start, y.start, z.start), (x.stop, y.stop, z.stop)
-        order = order_along(axis, grid)
-        crossed = sweep(*fields, flux, self.clear, corners, order, ends, ring, self.dt, bounds)
+        first, last = (x.start, y.start, z.start), (x.stop, y.stop, z.stop)
+        place = first, last, order_along(axis, grid)
+        crossed = sweep(fields, flux, self.clear, place, ends, ring, self.dt, bounds)
         return float(crossed[0].sum() - crossed[1].sum())
 
     def bounds(self, name: str, values: Array) -> Bounds:

@@ -97,12 +97,10 @@ def cross_row(
 
 @kernel
 def sweep(
-    field: Array,
-    volume: Array,
+    fields: tuple[Array, Array],
     flux: Array,
     clear: Marks,
-    box: tuple[Three, Three],
-    order: Three,
+    box: tuple[Three, Three, Three],
     ends: Array,
     wraps: bool,
     dt: float,
@@ -111,16 +109,17 @@ def sweep(
     """Carry a field along the second of its axes in an order, in a box and in place; gives the
     amounts through both ends of the box.
 
-    field   (nx, ny, nz) values of the cells
-    volume  (nx, ny, nz) of the cells, in place
+    fields  (nx, ny, nz) values of the cells, and their volumes
     flux    volume per time through the faces across the axis
     clear   (nx, ny, nz) see `bend_row`
-    box     first cell along each axis, and that after the last; (m, n, l) cells in this order
+    box     first cell along each axis, that after the last, and the order of axes, in which it has
+            (m, n, l) cells
     ends    (2, m, l) values beyond both sides, where the axis does not wrap
     bounds  of all values
     returns (2, m, l)
     """
-    (x, y, z), (x1, y1, z1) = box
+    field, volume = fields
+    (x, y, z), (x1, y1, z1), order = box
     faces = flux[x : x1 + (order[1] == 0), y : y1 + (order[1] == 1), z : z1 + (order[1] == 2)]
     flows = faces.transpose(order)
     values = field[x:x1, y:y1, z:z1].transpose(order)
