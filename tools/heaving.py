@@ -1,7 +1,7 @@
-"""The section of tools/flapping.py, inclined or sinking in a stream: `make cross-checks`.
+"""The section of tools/flapping.py, held or sinking in a stream: `make cross-checks`.
 
-Seen from the section both are the same flow. In the room the inclined one stays in its cells, and
-the one that sinks crosses them; docs/heaving.json has the lift of both.
+An inclined section, a level one in an inclined stream and a level one that sinks have the same flow,
+seen from the section. docs/heaving.json has the lift of each from several places in a cell.
 """
 
 from __future__ import annotations
@@ -27,6 +27,8 @@ ANGLE = 5.0
 """Of the flow against the section, degrees."""
 CHORDS = 6
 """Which the stream travels; the mean over the last one counts."""
+PLACES = 4
+"""At which the section starts in a cell, evenly across the stream."""
 
 MODEL = """<mujoco>
   <asset><mesh name="wing" file="wing.obj"/></asset>
@@ -54,13 +56,13 @@ resolution = {resolution}
 
 [fluid]
 density = 1.0
-velocity = [1.0, 0.0]
+velocity = [1.0, {rising}]
 
 [boundaries]
-x_min = {{ kind = "far", velocity = [1.0, 0.0] }}
-x_max = {{ kind = "far", velocity = [1.0, 0.0] }}
-y_min = {{ kind = "far", velocity = [1.0, 0.0] }}
-y_max = {{ kind = "far", velocity = [1.0, 0.0] }}
+x_min = {{ kind = "far", velocity = [1.0, {rising}] }}
+x_max = {{ kind = "far", velocity = [1.0, {rising}] }}
+y_min = {{ kind = "far", velocity = [1.0, {rising}] }}
+y_max = {{ kind = "far", velocity = [1.0, {rising}] }}
 
 [solids]
 model = "wing.xml"
@@ -69,12 +71,13 @@ density = 1.0
 [[motion]]
 kind = "formula"
 joint = "heave"
-position = "{sinking} * ({half} - t)"
+position = "{place} + {sinking} * ({half} - t)"
 """
 
 
-def lift(cells: int, incidence: float, sinking: float) -> float:
-    """Lift coefficient after CHORDS of a section with an incidence (degrees) that sinks (m/s)."""
+def lift(cells: int, incidence: float, rising: float, sinking: float, place: float) -> float:
+    """Lift coefficient after CHORDS of a section with an incidence (degrees) that sinks (m/s) in a
+    stream that rises (m/s), from a place across the stream (cells)."""
     with TemporaryDirectory() as made:
         folder = Path(made)
         ends = [np.pad(outline(), ((0, 0), (0, 1)), constant_values=z) for z in (-0.5, 0.5)]
@@ -84,8 +87,10 @@ def lift(cells: int, incidence: float, sinking: float) -> float:
             frames=8 * CHORDS,
             steps=math.ceil(1.5 * cells / 8.0),
             resolution=6 * cells,
+            rising=rising,
             sinking=sinking,
             half=0.5 * CHORDS,
+            place=place / cells,
         )
         (folder / "wing.toml").write_text(text, encoding="utf-8")
         lifts = []
@@ -97,20 +102,31 @@ def lift(cells: int, incidence: float, sinking: float) -> float:
 
 
 def table() -> str:
-    """The lift of both on each grid."""
+    """Mean, least and largest lift over the places, of each section on each grid."""
     found = json.loads(FOUND.read_text(encoding="utf-8"))
     rows = [
-        [f"{cells}", f"{still:.3f}", f"{moving:.3f}", f"{100.0 * (moving / still - 1.0):+.0f} %"]
-        for cells, (still, moving) in found.items()
+        [cells, *(f"{np.mean(v):.2f} ({min(v):.2f} to {max(v):.2f})" for v in lifts.values())]
+        for cells, lifts in found.items()
     ]
-    head = ("cells a chord", "inclined by 5 degrees", "sinks at tan 5 degrees", "off")
-    return markdown(head, rows)
+    return markdown(("cells a chord", *next(iter(found.values()))), rows)
 
 
 def write() -> None:
-    """Run both on each grid."""
-    sinking = math.tan(math.radians(ANGLE))
-    found = {cells: (lift(cells, ANGLE, 0.0), lift(cells, 0.0, sinking)) for cells in GRIDS}
+    """Run each on each grid from each place."""
+    slope = math.tan(math.radians(ANGLE))
+    sections = {
+        "held, inclined": (ANGLE, 0.0, 0.0),
+        "held, the stream rises": (0.0, slope, 0.0),
+        "sinks": (0.0, 0.0, slope),
+    }
+    places = [n / PLACES for n in range(PLACES)]
+    found = {
+        cells: {
+            name: [round(lift(cells, *section, place), 4) for place in places]
+            for name, section in sections.items()
+        }
+        for cells in GRIDS
+    }
     FOUND.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
 
 
