@@ -233,8 +233,9 @@ def test_a_recorded_run_turns_without_a_server(browser: Any, tmp_path: Path) -> 
     page.goto((tmp_path / "index.html").as_uri())
     assert [url.rsplit("/", 1)[1] for url in asked] == ["index.html", "turn.js"]
     page.get_by_role("button", name="Turn: A fish").click()
-    fish = page.get_by_role("img", name="A fish")
+    fish = page.locator("canvas")
     fish.wait_for()
+    assert fish.get_attribute("aria-label") == "A fish"
     before = fish.screenshot()
     sleep(1.0)
     assert fish.screenshot() != before
