@@ -1,7 +1,7 @@
 """The section of tools/flapping.py, held or sinking in a stream: `make cross-checks`.
 
-An inclined section, a level one in an inclined stream and a level one that sinks have the same flow,
-seen from the section. docs/heaving.json has the lift of each from several places in a cell.
+An inclined section, a level one in a stream that rises and a level one that sinks have the same
+flow, seen from the section. docs/heaving.json has the lift of each from several places in a cell.
 """
 
 from __future__ import annotations
