@@ -168,6 +168,44 @@ def test_what_a_kernel_of_a_kernel_raises_has_its_values():
     assert sum_of_roots(4.0, 5.0) == 3.0
 
 
+@kernel
+def row_of(size, value):
+    """A row of small numbers."""
+    row = np.empty(size, np.int16)
+    row[:] = value
+    return row
+
+
+@kernel
+def three_rows(size):
+    """The middle one of three rows."""
+    first, last = row_of(size, 1), row_of(size, 3)
+    between = np.empty(size, np.int16)
+    for n in range(size):
+        between[n] = (first[n] + last[n]) // 2
+    return between
+
+
+def test_constants_and_options_of_a_kernel_compile_nothing_anew():
+    compiled = []
+
+    class Listener(event.Listener):
+        def on_start(self, started):
+            compiled.append((started.data["dispatcher"].py_func.__qualname__, started.data["args"]))
+
+        def on_end(self, ended):
+            pass
+
+    listener = Listener()
+    event.register("numba:compile", listener)
+    try:
+        assert jit.compiled(three_rows.__wrapped__)(2).tolist() == [2, 2]
+    finally:
+        event.unregister("numba:compile", listener)
+    assert len(row_of.inner.signatures) == 1
+    assert sum("int16" in str(args) for name, args in compiled if "np_empty" in name) == 1
+
+
 def test_context_is_left_after_an_error():
     with pytest.raises(RuntimeError), kernel_threads():
         raise RuntimeError("stop")

@@ -159,6 +159,17 @@ def merged(one: Integers, other: Integers) -> tuple[Integers, Integers, Integers
     return found[:count].copy(), first, second
 
 
+@inlined
+def scale_to_one(parts: Array) -> bool:
+    """Make the sum of parts 1, in place; False where there are none."""
+    total = 0.0
+    for part in parts:
+        total += part
+    for n in range(parts.size if total > 0.0 else 0):
+        parts[n] /= total
+    return total > 0.0
+
+
 @kernel
 def find_targets(
     small: Integers,
@@ -191,7 +202,8 @@ def find_targets(
     cell_flat, pushed = cells.reshape(-1), kinds.reshape(-1)
     for n in range(small.size):
         f = small[n]
-        targets[n, :] = f
+        for way in range(6):
+            targets[n, way] = f
         at, beside = indices(shape, f), all_beside(shape, wraps, f)
         around, ahead, shut = 0.0, 0.0, 0.0
         for way in range(6):
@@ -212,9 +224,7 @@ def find_targets(
         for way in range(6) if ahead > 0.0 and around > 0.0 else range(0):
             if way // 2 != component:
                 parts[n, way] *= shut / around
-        total = parts[n].sum()
-        if total > 0.0:
-            parts[n] /= total
+        if scale_to_one(parts[n]):
             turn[n] = 0
     led = True
     while led:
@@ -228,9 +238,7 @@ def find_targets(
                 m = place_of(small, to, 0) if to >= 0 else small.size
                 if m < small.size and small[m] == to and 0 <= turn[m] <= last:
                     targets[n, way], parts[n, way] = to, max(volume_flat[to], nothing)
-            total = parts[n].sum()
-            if total > 0.0:
-                parts[n] /= total
+            if scale_to_one(parts[n]):
                 turn[n], led = last + 1, True
         last += int(led)
     order, count = np.empty(small.size, np.int64), 0
@@ -362,10 +370,11 @@ def share_velocity(field: Array, closed: Closed) -> None:
     targets."""
     flat, (small, targets, shares) = field.reshape(-1), closed
     for n in range(small.size - 1, -1, -1):
-        shared = 0.0
+        shared, given = 0.0, 0.0
         for m in range(6):
             shared += shares[n, m] * flat[targets[n, m]]
-        flat[small[n]] = (1.0 - shares[n].sum()) * flat[small[n]] + shared
+            given += shares[n, m]
+        flat[small[n]] = (1.0 - given) * flat[small[n]] + shared
 
 
 @kernel

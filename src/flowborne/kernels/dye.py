@@ -95,6 +95,20 @@ def cross_row(
         out[k] = g * ((one[k] if ahead else other[k]) + mean)
 
 
+@inlined
+def plane_of(box: Array, i: int, order: Three) -> Array:
+    """Plane i across the first axis of an order, its rows along the third; Numba's own transpose
+    takes two seconds to compile."""
+    across, along, line = order
+    if across == 0:
+        plane = box[i]
+    elif across == 1:
+        plane = box[:, i]
+    else:
+        plane = box[:, :, i]
+    return plane if along < line else plane.T
+
+
 @kernel
 def sweep(
     fields: tuple[Array, Array],
@@ -121,17 +135,17 @@ def sweep(
     field, volume = fields
     (x, y, z), (x1, y1, z1), order = box
     faces = flux[x : x1 + (order[1] == 0), y : y1 + (order[1] == 1), z : z1 + (order[1] == 2)]
-    flows = faces.transpose(order)
-    values = field[x:x1, y:y1, z:z1].transpose(order)
-    volumes = volume[x:x1, y:y1, z:z1].transpose(order)
-    cleared = clear[x:x1, y:y1, z:z1].transpose(order)
-    (m, n, count), (least, most), crossed = values.shape, bounds, np.zeros(ends.shape)
+    values, volumes = field[x:x1, y:y1, z:z1], volume[x:x1, y:y1, z:z1]
+    cleared, (least, most), crossed = clear[x:x1, y:y1, z:z1], bounds, np.zeros(ends.shape)
+    shape = values.shape
+    m, n, count = shape[order[0]], shape[order[1]], shape[order[2]]
     strips = (count + WIDTH - 1) // WIDTH
     for block in prange(m * strips):
         i, start = np.int64(block) // strips, (np.int64(block) % strips) * WIDTH
         w, strip = min(WIDTH, count - start), slice(start, start + WIDTH)
-        lines, room, through = values[i, :, strip], volumes[i, :, strip], flows[i, :, strip]
-        marks, c = cleared[i, :, strip], np.empty((n + 4, w))
+        lines, room = plane_of(values, i, order)[:, strip], plane_of(volumes, i, order)[:, strip]
+        through, marks = plane_of(faces, i, order)[:, strip], plane_of(cleared, i, order)[:, strip]
+        c = np.empty((n + 4, w))
         v, free = np.ones((n + 2, w)), np.empty(w)
         for j in range(n):
             copy(c[j + 2], lines[j])

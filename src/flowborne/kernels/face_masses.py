@@ -260,7 +260,9 @@ def share_out(
         axis = component if m == 0 else m - int(m <= component)
         if shape[axis] > 1:
             between = openings(listed, kinds, axis, opened, cells, cell, faces)
-            above[count], way[count], rest[count] = between
+            for n in range(size):
+                above[count, n], way[count, n] = between.above[n], between.way[n]
+                rest[count, n] = between.rest[n]
             count += 1
     shut, lent = closed.faces, np.empty(closed.shares.shape)
     for turn in range(ROUNDS):

@@ -35,7 +35,7 @@ import numpy as np
 from numba import njit
 from numba.core import event
 
-from flowborne.kernels.linking import KernelCompiler
+from flowborne.kernels.linking import KernelCompiler, forget_constants
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -167,6 +167,7 @@ class Kernel(Generic[P, R]):
         self.options = options
         self.outer = compiled(function, cache=True, **options)
         self.inner = compiled(function, no_cpython_wrapper=True, **options)
+        forget_constants(self.inner)
 
     def __call__(self, *args: P.args, **kwargs: P.kwargs) -> R:
         count = getattr(_thread, "most", 1)

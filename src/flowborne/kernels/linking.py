@@ -1,16 +1,20 @@
 """What only other kernels call becomes machine code with them, once.
 
 Numba optimises every function with all that it calls and makes machine code of both, so that what
-is at the end of a chain of five calls goes through LLVM five times.
+is at the end of a chain of five calls goes through LLVM five times. It compiles a function once
+more for each constant that it is called with, and its own, as `np.empty`, once more for each set of
+options of the function that calls.
 """
 
 from __future__ import annotations
 
+from functools import cached_property
 from types import FunctionType, SimpleNamespace
 from typing import Any
 
 from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import Compiler
+from numba.core.compiler import Compiler, Flags
+from numba.core.types.misc import unliteral
 
 
 class Linked(JITCodeLibrary):
@@ -40,6 +44,37 @@ class Linked(JITCodeLibrary):
         return 0
 
 
+OF_KERNELS = "no_cpython_wrapper", "no_cfunc_wrapper", "forceinline"
+"""Options in which kernels differ, which what they call does not get."""
+
+
+class KernelFlags(Flags):
+    """Options of a kernel, the same as another's where what they call gets the same ones."""
+
+    @cached_property
+    def given(self) -> tuple[Any, ...]:
+        """Values of those options. They stay while the kernel is compiled."""
+        return tuple(getattr(self, name) for name in self.options if name not in OF_KERNELS)
+
+    def __hash__(self) -> int:
+        return hash(KernelFlags)
+
+    def __eq__(self, other: object) -> bool:
+        if isinstance(other, KernelFlags):
+            return self.given == other.given
+        return super().__eq__(other)
+
+
+def forget_constants(dispatcher: Any) -> None:
+    """Let a function be compiled for all numbers where another calls it with a constant."""
+    template = dispatcher.get_call_template
+
+    def without(args: tuple[Any, ...], kws: dict[str, Any]) -> Any:
+        return template(tuple(map(unliteral, args)), kws)
+
+    dispatcher.get_call_template = without
+
+
 class Linking(Compiler):
     """Numba's own, but for functions without an entry from Python."""
 
@@ -47,6 +82,7 @@ class Linking(Compiler):
         """Compile the function. The environments of what it calls hold what these print, or raise
         with values."""
         state = self.state
+        state.flags = KernelFlags(state.flags)
         if state.flags.no_cpython_wrapper:
             state.library = Linked(state.targetctx.codegen(), func.__qualname__)
             state.library.inlined = state.flags.forceinline
