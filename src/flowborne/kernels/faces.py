@@ -120,6 +120,26 @@ def still_to_come(out: Array, rate: Array, now: Array, was: Array, dt: float) ->
 
 
 @kernel
+def add_weighted(
+    sums: Array, volume: Array, density: float, first: Array, before: Array, after: Array
+) -> None:
+    """Add those of a row to sums (5, LANES), see `weighted_sums`; apart from its loop, which Numba
+    does not vectorise where that runs on threads."""
+    ones, lows, highs, changes, sizes = sums[0], sums[1], sums[2], sums[3], sums[4]
+    for at in range(0, volume.size, LANES):
+        lane = slice(at, min(at + LANES, volume.size))
+        v, a, b, c = volume[lane], first[lane], before[lane], after[lane]
+        for k in range(v.size):
+            m = density * v[k]
+            change = m * (c[k] - b[k])
+            ones[k] += m * a[k]
+            lows[k] += m * b[k]
+            highs[k] += m * c[k]
+            changes[k] += change
+            sizes[k] += abs(change)
+
+
+@kernel
 def weighted_sums(
     volume: Array, density: float, first: Array, before: Array, after: Array
 ) -> Array:
@@ -128,25 +148,15 @@ def weighted_sums(
     held, other, low, high = flat(volume), flat(first), flat(before), flat(after)
     parts = np.zeros((held.shape[0], 5))
     for i in prange(held.shape[0]):
-        rows = np.zeros((5, LANES))
-        ones, lows, highs, changes, sizes = rows[0], rows[1], rows[2], rows[3], rows[4]
-        for at in range(0, held.shape[1], LANES):
-            lane = slice(at, min(at + LANES, held.shape[1]))
-            v, a, b, c = held[i, lane], other[i, lane], low[i, lane], high[i, lane]
-            for k in range(v.size):
-                m = density * v[k]
-                change = m * (c[k] - b[k])
-                ones[k] += m * a[k]
-                lows[k] += m * b[k]
-                highs[k] += m * c[k]
-                changes[k] += change
-                sizes[k] += abs(change)
+        sums = np.zeros((5, LANES))
+        add_weighted(sums, held[i], density, other[i], low[i], high[i])
         for n in range(5):
             for k in range(LANES):
-                parts[i, n] += rows[n, k]
+                parts[i, n] += sums[n, k]
     total = np.zeros(5)
     for i in range(held.shape[0]):
-        total += parts[i]
+        for n in range(5):
+            total[n] += parts[i, n]
     return total
 
 
