@@ -26,6 +26,9 @@ CORE_DEPTH = 2.0
 CORE_GAP = 3.0
 """Distance of the axis of a core from the joints at its ends, in radii."""
 
+LONGEST_GAP = 0.3
+"""Largest of these distances, in lengths from joint to joint."""
+
 EDGE = 1.2
 """Edges of the elements over the median depth of the axes."""
 
@@ -38,7 +41,8 @@ class CharacterFlesh:
     """Flesh of a character at rest.
 
     surface     around it, with domes about the joints in the bodies that carry it, m
-    cores       joint -> ends (2, 3) of the axis of its capsule, and the radius, m
+    cores       joint -> ends (2, 3) of the axis of its capsule, and the radius, m; both ends of
+                the axis may be the same
     neighbours  joints of the bodies that carry it, and of those that it carries
     edge        length of the edges of elements, m
     """
@@ -100,9 +104,10 @@ def _axis(rig: Rig, division: Division, joint: int) -> Array:
 def _core(axis: Array, depth: Array, radius: float) -> tuple[Array, float]:
     """Ends and radius of the longest capsule on an axis that is deep enough everywhere."""
     along = np.linalg.norm(axis - axis[0], axis=1)
-    deep = depth >= CORE_DEPTH * radius
-    room = (along >= CORE_GAP * radius) & (along <= along[-1] - CORE_GAP * radius)
-    fits = deep & room if (deep & room).any() else depth == depth.max()
+    gap = min(CORE_GAP * radius, LONGEST_GAP * along[-1])
+    fits = (depth >= CORE_DEPTH * radius) & (along >= gap) & (along <= along[-1] - gap)
+    if not fits.any():
+        fits = depth == depth.max()
     starts = np.flatnonzero(fits & ~np.append(False, fits[:-1]))
     ends = np.flatnonzero(fits & ~np.append(fits[1:], False))
     longest = int((ends - starts).argmax())

@@ -70,8 +70,10 @@ def model_files(
         if flesh is not None and joint in flesh.cores:
             ends, radius = flesh.cores[joint]
             ends = (ends - rig.position[joint]) @ rig.rotation[joint]
-            size = {"type": "capsule", "fromto": _numbers(ends), "size": f"{radius:.9g}"}
-            ElementTree.SubElement(body, "geom", {"name": own} | size)
+            core = {"type": "capsule", "fromto": _numbers(ends)}
+            if np.ptp(ends, axis=0).max() < 1e-3 * radius:
+                core = {"type": "sphere", "pos": _numbers(ends[0])}
+            ElementTree.SubElement(body, "geom", {"name": own, "size": f"{radius:.9g}"} | core)
         elif len(division.pieces[joint][1]):
             file = f"{name}-meshes/{joint}.obj"
             shape, piece = (
