@@ -18,6 +18,7 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError, cKDTree
 
 from flowborne.base.errors import SceneError
+from flowborne.base.phrases import location
 from flowborne.characters.rig import PLAIN, Rig, Surface
 from flowborne.kernels.arrays import Array, Integers, Mesh
 from flowborne.shapes.closing import SMALL_HOLE, across_of, fans, loops_of, rims_of, wound
@@ -92,6 +93,7 @@ def divided(
             f"{name}: the surface encloses {volume:.3g} m^3. Orient its faces outward (in Blender: "
             "Mesh, Normals, Recalculate Outside), and use a surface that encloses a volume."
         )
+    _check_outward(whole, volume, name)
     own, _ = _pieces(rig, np.arange(len(rig.names)), whole, domed=False)
     owners, leader = _merged(rig, np.array([volume_of(piece) for piece in own]) / volume)
     unsound: list[int] = []
@@ -109,6 +111,22 @@ def divided(
     )
     soft = _soft(rig, owners, whole, _named(rig, moves, flesh, name))
     return Division(owners, leader, own_pieces, own_shapes, volume, filled, tuple(unsound), soft)
+
+
+def _check_outward(surface: Surface, volume: float, file: str) -> None:
+    """Raise SceneError for a connected part of a closed surface with faces inward, unless it is a
+    cavity of the others, or so small that it makes no body."""
+    points, faces = surface.vertices, surface.faces
+    part = connected(len(points), faces[:, :2].ravel(), faces[:, 1:].ravel())[faces[:, 0]]
+    volumes = np.bincount(part, np.linalg.det(points[faces]) / 6.0)
+    for wrong in np.flatnonzero(volumes < -MIN_VOLUME * volume):
+        own = points[np.unique(faces[part == wrong])]
+        if (ShapeMesh(points, faces[part != wrong]).distance(own) > 0.0).any():
+            place, size = location(own.mean(axis=0).round(6)), np.ptp(own, axis=0).max()
+            raise SceneError(
+                f"{file}: the mesh around {place}, {size:.3g} m long, is inside out. Orient its "
+                "faces outward (in Blender: Mesh, Normals, Recalculate Outside)."
+            )
 
 
 def _named(rig: Rig, moves: list[int], names: Sequence[str], file: str) -> list[int]:
