@@ -61,7 +61,7 @@ class FlowborneSettings(bpy.types.PropertyGroup):
     )
     stiffness: FloatProperty(
         name="Stiffness",
-        description="Young's modulus of the flesh, kPa: fat 5, muscle 50, rubber 1000",
+        description="Young's modulus of the flesh, kPa: muscle 50, rubber 1000",
         default=50.0,
         min=0.1,
     )

@@ -29,7 +29,7 @@ CORE_GAP = 3.0
 LONGEST_GAP = 0.3
 """Largest of these distances, in lengths from joint to joint."""
 
-EDGE = 1.2
+EDGE = 1.5
 """Edges of the elements over the median depth of the axes."""
 
 SAMPLES = 65
@@ -67,7 +67,7 @@ def flesh_of(
     shape = ShapeMesh(*surface)
     cores, depths = {}, []
     for joint in sorted(map(rig.names.index, bones)):
-        axis = _axis(rig, division, joint)
+        axis, gaps = _axis(rig, division, joint)
         depth = -shape.distance(axis)
         if not (depth > 0.0).any():
             raise SceneError(
@@ -75,7 +75,7 @@ def flesh_of(
                 "flesh can grow around it. Move the bone inside in its rest pose, or leave it out."
             )
         middle = float(np.median(depth[depth > 0.0]))
-        cores[joint] = _core(axis, depth, CORE_RADIUS * middle)
+        cores[joint] = _core(axis, depth, CORE_RADIUS * middle, gaps)
         depths.append(middle)
     neighbours = _neighbours(rig, division, [*cores])
     return CharacterFlesh(surface, cores, neighbours, EDGE * float(np.median(depths)))
@@ -90,22 +90,24 @@ def _neighbours(rig: Rig, division: Division, soft: list[int]) -> tuple[int, ...
     return tuple(each for each in dict.fromkeys(found) if len(division.pieces[each][1]))
 
 
-def _axis(rig: Rig, division: Division, joint: int) -> Array:
-    """(SAMPLES, 3) points from a joint to the mean of the joints below it, or through the centre of
-    its piece to twice as far."""
+def _axis(rig: Rig, division: Division, joint: int) -> tuple[Array, int]:
+    """(SAMPLES, 3) points from a joint to the mean of the joints below it, 2 ends with a gap.
+
+    Without one it ends at the centre of the piece, without a gap, so that the end of flesh is free.
+    """
     start, below = rig.position[joint], np.flatnonzero(rig.parents == joint)
-    ends = rig.position[below]
-    end = ends.mean(axis=0) if len(below) else start
+    end, gaps = rig.position[below].mean(axis=0) if len(below) else start, 2
     if np.allclose(end, start):
-        end = 2.0 * ShapeMesh(*division.pieces[joint]).centroid - start
-    return start + np.linspace(0.0, 1.0, SAMPLES)[:, None] * (end - start)
+        end, gaps = ShapeMesh(*division.pieces[joint]).centroid, 1
+    return start + np.linspace(0.0, 1.0, SAMPLES)[:, None] * (end - start), gaps
 
 
-def _core(axis: Array, depth: Array, radius: float) -> tuple[Array, float]:
+def _core(axis: Array, depth: Array, radius: float, gaps: int) -> tuple[Array, float]:
     """Ends and radius of the longest capsule on an axis that is deep enough everywhere."""
     along = np.linalg.norm(axis - axis[0], axis=1)
     gap = min(CORE_GAP * radius, LONGEST_GAP * along[-1])
-    fits = (depth >= CORE_DEPTH * radius) & (along >= gap) & (along <= along[-1] - gap)
+    fits = (depth >= CORE_DEPTH * radius) & (along >= gap)
+    fits &= along <= along[-1] - (gaps - 1) * gap
     if not fits.any():
         fits = depth == depth.max()
     starts = np.flatnonzero(fits & ~np.append(False, fits[:-1]))
