@@ -180,12 +180,11 @@ class FlowborneFlesh(bpy.types.Operator):
 
     def execute(self, context: Any) -> set[str]:
         with _reported(self):
-            armature, job, motion = _result(context)
+            armature, job, _ = _result(context)
             reaction = job.reaction
-            skin = read_skin(job.run, reaction.lead)
-            moved = add_flesh(
-                context, armature, motion, skin, reaction.bones, reaction.first, reaction.unit
-            )
+            motion, skin = read_motion(job.run, reaction.lead), read_skin(job.run, reaction.lead)
+            first, unit = reaction.first, reaction.unit
+            moved = add_flesh(context, armature, motion, skin, reaction.bones, first, unit)
             self.report({"INFO"}, f"flesh moves {', '.join(mesh.name for mesh in moved)}")
             return {"FINISHED"}
         return {"CANCELLED"}
