@@ -44,26 +44,26 @@ def add_flesh(
         raise MotionError(
             f"armature '{armature.name}' has no bone '{missing[0]}' of the run: rename it back"
         )
-    moved = []
+    found, carried = [], _carried(armature, motion, bones)
     for _ in in_frames(context, [first]):
         flesh = _Flesh(armature, motion, skin, unit)
-        carried = _carried(armature, motion, bones)
         for mesh in meshes_of(context, armature):
-            for modifier in [each for each in mesh.modifiers if each.name.startswith(FLESH)]:
-                mesh.modifiers.remove(modifier)
+            if not carried & {*mesh.vertex_groups.keys()}:
+                continue
             points, weights = _before_armature(context, mesh, [*flesh.skinning])
             share = weights[:, [name in carried for name in flesh.skinning]].sum(axis=1)
             chosen = np.flatnonzero(share)
             if chosen.size:
                 offsets = share[chosen, None] * flesh.offsets(mesh, points[chosen], weights[chosen])
-                _add_modifier(mesh, len(points), chosen, offsets, first)
-                moved.append(mesh)
-    if not moved:
+                found.append((mesh, len(points), chosen, offsets))
+    if not found:
         raise MotionError(
             f"no visible mesh of armature '{armature.name}' has weights for {', '.join(bones)}: "
             "show or select the mesh that was run"
         )
-    return moved
+    for each in found:
+        _add_modifier(*each, first)
+    return [mesh for mesh, *_ in found]
 
 
 class _Flesh:
@@ -166,12 +166,12 @@ def _carried(armature: Any, motion: Motion, bones: Sequence[str]) -> set[str]:
 def _before_armature(context: Any, mesh: Any, bones: list[str]) -> tuple[Array, Array]:
     """(n, 3) vertices of a mesh in this frame before its armature deforms it, and (n, b) their
     weights of bones, with sum 1. Raises MotionError without an Armature modifier."""
-    number = _number(mesh)
-    copy = mesh.copy()
+    number, copy = _number(mesh), mesh.copy()
     context.scene.collection.objects.link(copy)
     try:
-        for modifier in copy.modifiers[number:]:
-            copy.modifiers.remove(modifier)
+        for n, modifier in enumerate([*copy.modifiers]):
+            if n >= number or modifier.name.startswith(FLESH):
+                copy.modifiers.remove(modifier)
         evaluated = copy.evaluated_get(context.evaluated_depsgraph_get()).to_mesh()
         points = np.empty(3 * len(evaluated.vertices), np.float32)
         evaluated.vertices.foreach_get("co", points)
@@ -203,7 +203,8 @@ def _number(mesh: Any) -> int:
 
 
 def _add_modifier(mesh: Any, count: int, chosen: Integers, offsets: Array, first: int) -> None:
-    """Add the modifier that moves the chosen ones of a mesh's vertices in front of the armature.
+    """Add the modifier that moves some vertices of a mesh, in front of the armature's and in place
+    of an earlier one of ours.
 
     count    of the vertices of the mesh
     chosen   (n,) numbers of vertices
@@ -219,8 +220,9 @@ def _add_modifier(mesh: Any, count: int, chosen: Integers, offsets: Array, first
     data.vertices.foreach_set("co", rows.ravel())
     data.attributes.new("number", "INT", "POINT").data.foreach_set("value", numbers)
     carrier = bpy.data.objects.new(FLESH, data)
-    place = _number(mesh)
-    modifier = mesh.modifiers.new(FLESH, "NODES")
+    for earlier in [each for each in mesh.modifiers if each.name.startswith(FLESH)]:
+        mesh.modifiers.remove(earlier)
+    place, modifier = _number(mesh), mesh.modifiers.new(FLESH, "NODES")
     modifier.node_group = _nodes(carrier, count, offsets.shape, first)
     mesh.modifiers.move(len(mesh.modifiers) - 1, place)
 

@@ -25,6 +25,15 @@ assert "mesh 'rig body' is bound to the armature by its parent: give it an" in r
 body.parent_type = "OBJECT"
 body.modifiers.new("Armature", "ARMATURE").object = rig
 assert np.abs(shown(body, 3) - plain).max() < 1e-6
+other = body.copy()  # a mesh without weights for flesh needs no modifier
+bpy.context.scene.collection.objects.link(other)
+other.data = body.data.copy()
+other.vertex_groups.clear()
+other.modifiers.clear()
+other.parent_type = "ARMATURE"
+assert bpy.ops.flowborne.flesh() == {"FINISHED"}
+assert (len(body.modifiers), len(other.modifiers)) == (2, 0)
+body.modifiers.remove(body.modifiers[0])
 for name in ("tail", "tip"):
     body.vertex_groups.remove(body.vertex_groups[name])
 assert "no visible mesh of armature 'rig' has weights for tail, tip" in refusal(rig, "flesh")
