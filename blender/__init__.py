@@ -13,7 +13,9 @@ stand_in     a copy of a character with its deforming bones alone
 character    armature, meshes and settings from a Blender scene
 bake         a run as an action on the NLA
 jobs         the jobs of this session, and those next to the .blend
+nodes        groups of geometry nodes
 forces       forces of a run as points with attributes
+flesh        flesh of a run on the meshes of a character
 ink          the ink of a run as a volume
 ghost        a copy of a character that plays the frames of a run so far
 operators    what the buttons do

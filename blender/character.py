@@ -174,6 +174,8 @@ def reaction_of(context: Any, armature: Any, settings: Any) -> Reaction:
         follow=settings.follow,
         strength=math.degrees(settings.strength),
         ink=ink_of(settings, unit),
+        young=0.0 if settings.flesh == "NONE" else 1e3 * settings.stiffness,
+        follows=settings.flesh == "FOLLOW",
     )
 
 

@@ -77,7 +77,7 @@ class Install(Process):
             super()._ended(code or 1)
             return
         if code == 0 and doing is State.CREATING:
-            pip = [flowborne[0], "-m", "pip", "install", *QUIET, str(self._source)]
+            pip = [flowborne[0], "-m", "pip", "install", *QUIET, f"{self._source}[flesh]"]
             self._spawn(State.INSTALLING, pip)
         elif code == 0 and doing is State.INSTALLING:
             self._spawn(State.TRYING, [*flowborne, "--version"])

@@ -8,12 +8,14 @@ present frame, and puts arrows on them.
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import bpy
 import numpy as np
 
 from .motion import Motion
+from .nodes import add_node
 
 NAME = "flowborne forces"
 
@@ -59,12 +61,7 @@ def _arrows(per_newton: float) -> Any:
     length_of.default_value = per_newton
     new_socket("Arrows", in_out="OUTPUT", socket_type="NodeSocketGeometry")
 
-    def node(kind: str, **settings: Any) -> Any:
-        made = group.nodes.new(kind)
-        for key, value in settings.items():
-            setattr(made, key, value)
-        return made
-
+    node = partial(add_node, group)
     given, result = node("NodeGroupInput"), node("NodeGroupOutput")
     time, now = node("GeometryNodeInputSceneTime"), node("ShaderNodeMath", operation="COMPARE")
     frame = node("GeometryNodeInputNamedAttribute", data_type="INT")

@@ -65,6 +65,8 @@ class Job(Process):
         self.reaction.save(self.folder / "job.json")
         size = ["--density", str(self.reaction.density), "--scale", str(self.reaction.unit)]
         command = ["import", str(self.folder / CHARACTER), "--out", str(scene), "--fill", *size]
+        for bone in self.reaction.bones if self.reaction.young else ():
+            command += ["--flesh", bone]
         self._spawn(State.IMPORTING, [*self.engine, *command])
 
     def start_export(self) -> None:

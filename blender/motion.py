@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 
 STATE = ("body_position", "body_rotation", "fluid_centre", "fluid_force")
@@ -124,9 +125,49 @@ def read_motion(run: Path, start: int = 0) -> Motion:
         raise MotionError(f"{run} has no frames to bake ({error}): resume the run") from error
 
 
-def _read(path: Path) -> list[Array]:
+def _read(path: Path, names: Iterable[str] = STATE) -> list[Array]:
     with np.load(path) as state:
-        return [state[name] for name in STATE]
+        return [state[name] for name in names]
+
+
+@dataclass(frozen=True, eq=False)
+class Skin:
+    """The skin of flesh in the frames of a run.
+
+    triangles  (m, 3) vertices, outward
+    body       a bone that carries flesh
+    rest       (k, 3) m, the vertices at rest in the axes of this bone
+    vertices   (frames, k, 3) m
+    """
+
+    triangles: Integers
+    body: str
+    rest: Array
+    vertices: Array
+
+
+def read_skin(run: Path, start: int = 0) -> Skin:
+    """The skin of flesh in a run, complete or not, from a frame on.
+
+    raises  MotionError when the run has no flesh, or a file cannot be read
+    """
+    try:
+        model = json.loads((run / "model.json").read_text(encoding="utf-8"))
+        flesh, paths = model.get("flesh"), sorted((run / "states").glob("[0-9]*.npz"))[start:]
+        if flesh is None or not paths:
+            raise ValueError("it has no flesh: choose it in Flesh, and start a new run")
+        body = flesh["bodies"].index(next(filter(None, flesh["bodies"])))
+        position, rotation = (
+            np.array(flesh[f"body_{key}"][body]) for key in ("position", "rotation")
+        )
+        return Skin(
+            np.array(flesh["triangles"]),
+            model["bodies"][flesh["bodies"][body]],
+            (np.array(flesh["rest"]) - position) @ rotation,
+            np.array([_read(path, ["flesh_vertices"])[0] for path in paths], np.float64),
+        )
+    except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
+        raise MotionError(f"{run} has no flesh to show ({error})") from error
 
 
 def angles(one: Array, other: Array) -> Array:

@@ -14,6 +14,7 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, St
 from .bake import bake, turned_away
 from .character import armature_of, control_of, selected_bones
 from .environment import Install, engine_command
+from .flesh import add_flesh
 from .forces import add_forces
 from .ghost import remove_ghosts, show_ghost
 from .ink import add_ink
@@ -29,7 +30,7 @@ from .jobs import (
     start_install,
     start_job,
 )
-from .motion import Motion, read_motion
+from .motion import Motion, read_motion, read_skin
 from .presets import PRESETS, named_in, preset
 from .process import State
 from .reaction import ReactionError
@@ -166,6 +167,25 @@ class FlowborneForces(bpy.types.Operator):
         with _reported(self):
             armature, job, motion = _result(context)
             add_forces(context, armature, motion, job.reaction.first, job.reaction.unit)
+            return {"FINISHED"}
+        return {"CANCELLED"}
+
+
+class FlowborneFlesh(bpy.types.Operator):
+    """Let the flesh of the run move the mesh, by a modifier in front of the armature's"""
+
+    bl_idname = "flowborne.flesh"
+    bl_label = "Show Flesh"
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012 - Blender's way
+
+    def execute(self, context: Any) -> set[str]:
+        with _reported(self):
+            armature, job, _ = _result(context)
+            reaction = job.reaction
+            motion, skin = read_motion(job.run, reaction.lead), read_skin(job.run, reaction.lead)
+            first, unit = reaction.first, reaction.unit
+            moved = add_flesh(context, armature, motion, skin, reaction.bones, first, unit)
+            self.report({"INFO"}, f"flesh moves {', '.join(mesh.name for mesh in moved)}")
             return {"FINISHED"}
         return {"CANCELLED"}
 

@@ -17,6 +17,7 @@ from .operators import (
     FlowborneBake,
     FlowborneCancel,
     FlowborneChoose,
+    FlowborneFlesh,
     FlowborneForces,
     FlowborneInk,
     FlowborneInstall,
@@ -94,7 +95,11 @@ class FlowbornePanel(bpy.types.Panel):
         if settings.simulated:
             layout.prop(settings, "resolution")
             layout.prop(settings, "ink")
-        for name in ("density", "floats", "objective", "follow", "strength", "rounds"):
+        layout.prop(settings, "flesh")
+        if settings.flesh != "NONE":
+            layout.prop(settings, "stiffness")
+        steered = () if settings.flesh == "FOLLOW" else ("objective", "follow", "strength")
+        for name in ("density", "floats", *steered, "rounds"):
             layout.prop(settings, name)
         if settings.rounds == 1:
             layout.prop(settings, "preroll")
@@ -120,6 +125,8 @@ class FlowbornePanel(bpy.types.Panel):
             layout.operator(FlowborneRun.bl_idname, text="Resume").resume = True
         layout.operator_menu_enum(FlowborneBake.bl_idname, "bones")
         layout.operator(FlowborneForces.bl_idname)
+        if job.reaction.young:
+            layout.operator(FlowborneFlesh.bl_idname)
         if job.reaction.ink and not job.active:
             layout.operator(FlowborneInk.bl_idname)
 
@@ -167,6 +174,7 @@ CLASSES = (
     FlowborneCancel,
     FlowborneBake,
     FlowborneForces,
+    FlowborneFlesh,
     FlowborneInk,
     FlowbornePreset,
     FlowborneSelect,

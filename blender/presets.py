@@ -12,6 +12,7 @@ PRESETS = {
     "WING": ("wing", "feather", "pinion", "alula"),
     "ARMS": ("arm", "upperarm", "forearm", "lowerarm", "elbow", "hand", "wrist"),
     "SPINE": ("spine", "spinal", "torso", "chest", "abdomen", "waist", "vertebra"),
+    "SOFT": ("belly", "bosom", "breast", "buttock", "cheek", "ear", "jiggle", "jowl", "udder"),
 }
 """Preset -> words in the names of its bones."""
 

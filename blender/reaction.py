@@ -27,13 +27,16 @@ SERVO = {
     "servo": {"kind": "pd", "frequency": 4.0},
 }
 
-IN_WIND = SERVO | {"rule": {"kind": "golden-section", "tolerance": 0.1}}
-IN_FLOW = SERVO | {"gradient": {"kind": "one-sided"}, "rule": {"kind": "resilient"}}
-"""[controller]. A trial in a simulated flow solves for the flow: half as many trials per decision,
-and no search along the gradient, take a quarter of the time."""
+QUICK = SERVO | {"rule": {"kind": "golden-section", "tolerance": 0.1}}
+SLOW = SERVO | {"gradient": {"kind": "one-sided"}, "rule": {"kind": "resilient"}}
+"""[controller], for a uniform wind, and where a trial solves for a flow or for flesh: half as many
+trials per decision, and no search along the gradient, take a quarter of the time."""
+
+FLESH_STEPS_PER_SECOND = 100.0
+"""Least number of time steps with flesh: it shakes at up to some 10 Hz."""
 
 PROBES = 1.0, 5.0
-"""Displacement of a trial in a uniform wind and in a simulated flow, degrees."""
+"""Displacement of a trial, degrees, with either controller."""
 
 BASE_MEGABYTES, BYTES_PER_CELL = 320.0, 3700.0
 SECONDS_PER_CELL, SECONDS_PER_CELL_AND_BONE = 2e-5, 3.3e-5
@@ -67,6 +70,8 @@ class Reaction:
     lead        frames of the run before `first`, in which bones settle
     loop        whether the animation is a cycle that the run repeats; its last round is baked
     ink         corners of a box in which the simulated flow is coloured, m; empty without one
+    young       Young's modulus of the flesh around the bones, N/m^2; 0 without flesh
+    follows     whether the bones follow the animation, so that only their flesh reacts
     """
 
     bones: tuple[str, ...]
@@ -88,6 +93,8 @@ class Reaction:
     lead: int = 0
     loop: bool = False
     ink: tuple[Vector, Vector] | tuple[()] = ()
+    young: float = 0.0
+    follows: bool = False
 
     def __post_init__(self) -> None:
         if not self.bones:
@@ -98,7 +105,7 @@ class Reaction:
             raise ReactionError(
                 "a root that floats leaves the cycle: clear Root Floats, or set Rounds to 1"
             )
-        if self.objective.endswith("drag") and not any(self.flow):
+        if not self.follows and self.objective.endswith("drag") and not any(self.flow):
             raise ReactionError(
                 f"the objective {self.objective} needs a flow: set its velocity, or choose effort"
             )
@@ -141,7 +148,7 @@ def write_scene(imported: Path, reaction: Reaction) -> Path:
 def _limit(tree: ElementTree.ElementTree[Any], reaction: Reaction) -> None:
     """Give the ball joints of free bones their range."""
     joints = {joint.attrib["name"]: joint for joint in tree.iterfind("worldbody//joint")}
-    for bone in reaction.bones:
+    for bone in reaction.bones if not reaction.follows else ():
         if bone not in joints:
             raise ReactionError(
                 f"bone '{bone}' moves nothing of its own: it has too little of the mesh, or is the "
@@ -158,7 +165,11 @@ def scene_of(imported: Mapping[str, Any], reaction: Reaction, root: str) -> dict
     root  name of the character's free joint
     """
     scene = {key: value for key, value in imported.items() if key not in ("initial", "output")}
-    time, probe = dict(scene["time"]), PROBES[reaction.simulated]
+    time, slow = dict(scene["time"]), reaction.simulated or reaction.young > 0.0
+    if reaction.young:
+        scene["flesh"] = [table | {"young": reaction.young} for table in scene["flesh"]]
+        least = math.ceil(FLESH_STEPS_PER_SECOND / reaction.rate)
+        time["steps_per_frame"] = max(time["steps_per_frame"], least)
     if reaction.simulated:
         domain = dict(scene["domain"])
         sides = [high - low for low, high in zip(domain["lower"], domain["upper"], strict=True)]
@@ -177,13 +188,16 @@ def scene_of(imported: Mapping[str, Any], reaction: Reaction, root: str) -> dict
         for table in ("domain", "fluid", "boundaries"):
             scene.pop(table)
         scene["wind"] = [{"kind": "faces", "velocity": reaction.flow, "density": reaction.medium}]
+    if not reaction.follows:
+        scene["control"] = [
+            {"joints": reaction.bones, "strength": reaction.strength, "probe": PROBES[slow]}
+        ]
+        scene["objectives"] = [*_objectives(reaction)]
+        scene["controller"] = SLOW if slow else QUICK
     return scene | {
         "gravity": reaction.gravity,
         "time": time | {"frames_per_second": reaction.rate, "frames": reaction.frames},
         "clip": scene["clip"] | {"loop": reaction.loop, "free": [root] if reaction.floats else []},
-        "control": [{"joints": reaction.bones, "strength": reaction.strength, "probe": probe}],
-        "objectives": [*_objectives(reaction)],
-        "controller": IN_FLOW if reaction.simulated else IN_WIND,
         "output": {"checkpoint_every": CHECKPOINT_FRAMES},
     }
 
@@ -208,7 +222,8 @@ def cost_of(path: Path, reaction: Reaction) -> str:
     sides = [high - low for low, high in zip(domain["lower"], domain["upper"], strict=True)]
     cells = math.prod(math.ceil(s / max(sides) * domain["resolution"] - 1e-9) for s in sides)
     megabytes = BASE_MEGABYTES + BYTES_PER_CELL * cells / 1e6
-    per_cell = SECONDS_PER_CELL + SECONDS_PER_CELL_AND_BONE * len(reaction.bones)
+    free = 0 if reaction.follows else len(reaction.bones)
+    per_cell = SECONDS_PER_CELL + SECONDS_PER_CELL_AND_BONE * free
     minutes = cells * per_cell * reaction.frames / 60.0
     return f"{cells} cells, {megabytes / 1e3:.1f} GB, about {math.ceil(minutes)} min"
 

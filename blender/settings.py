@@ -18,6 +18,13 @@ from bpy.props import (
 
 from .reaction import OBJECTIVES
 
+FLESH = {
+    "NONE": ("None", "The mesh is rigid around each bone"),
+    "REACT": ("Bones React", "The bones react, and the mesh around them is soft"),
+    "FOLLOW": ("Bones Follow", "The bones follow the animation, and the soft mesh reacts"),
+}
+"""Choice -> label and description."""
+
 
 class FlowborneSettings(bpy.types.PropertyGroup):
     """Settings of an armature; `folder` is that of its last job."""
@@ -46,6 +53,17 @@ class FlowborneSettings(bpy.types.PropertyGroup):
         name="Ink",
         description="Object in whose bounding box the simulated flow is coloured",
         type=bpy.types.Object,
+    )
+    flesh: EnumProperty(
+        name="Flesh",
+        description="Whether the mesh around the selected bones is soft, and what the bones do",
+        items=[(key, label, text) for key, (label, text) in FLESH.items()],
+    )
+    stiffness: FloatProperty(
+        name="Stiffness",
+        description="Young's modulus of the flesh, kPa: muscle 50, rubber 1000",
+        default=50.0,
+        min=0.1,
     )
     density: FloatProperty(
         name="Body", description="Density of the character, kg/m³", default=1000.0, min=1e-3

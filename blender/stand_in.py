@@ -18,6 +18,9 @@ from mathutils import Matrix
 from .keys import add_keys, new_action
 from .motion import Array
 
+FLESH = "flowborne flesh"
+"""Start of the names of our modifiers, which copies of meshes lack."""
+
 SAME_PLACE = 1e-4
 """Largest difference of rest poses of two bones in the same place, in lengths of the bone."""
 
@@ -56,6 +59,8 @@ def stand_in(
             skin.parent, skin.parent_type = copy, "OBJECT"
             skin.matrix_parent_inverse = copy.matrix_world.inverted()
             skin.matrix_world = mesh.matrix_world
+            for modifier in [each for each in skin.modifiers if each.name.startswith(FLESH)]:
+                skin.modifiers.remove(modifier)
             modifiers = [each for each in skin.modifiers if each.type == "ARMATURE"]
             for modifier in modifiers or [skin.modifiers.new(name, "ARMATURE")]:
                 modifier.object = copy

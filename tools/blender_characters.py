@@ -1,4 +1,4 @@
-"""Characters of the samples for Blender: a fox, a swimmer and a bird, each with a cycle.
+"""Characters of the samples for Blender: a fox, a swimmer, a bird and a bear, each with a cycle.
 
 Skins of the bodies in a run are closed tubes along bones. Heads, legs and arms are parts that move
 with a bone and are in no run. All characters look along -y; lengths are in m.
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from math import pi, sin
+from math import cos, pi, sin
 from typing import Any
 
 import bmesh
@@ -21,6 +21,9 @@ PERIOD = 24
 AROUND = 16
 """Vertices of a ring."""
 
+HOP = 0.45
+"""Height of a hop, m."""
+
 BLEND = 0.2
 """Length of a tube over which the weight passes from one bone to the next, in mean bone lengths."""
 
@@ -31,6 +34,7 @@ Part = tuple[Point, Point, Colour]
 
 FUR, PALE, DARK = (0.72, 0.24, 0.07), (0.85, 0.75, 0.62), (0.03, 0.02, 0.02)
 SKIN, SUIT, HAIR = (0.75, 0.45, 0.32), (0.05, 0.1, 0.35), (0.12, 0.05, 0.02)
+BROWN = (0.33, 0.16, 0.06)
 PLUMAGE, WING, BEAK = (0.9, 0.9, 0.92), (0.42, 0.45, 0.5), (0.9, 0.5, 0.05)
 
 
@@ -120,6 +124,49 @@ def bird() -> Any:
     beak: list[Part] = [((0.0, -0.1, height - 0.005), (0.015, 0.05, 0.012), BEAK)]
     carry(rig, "body", fan + eyes + beak)
     cycle(rig, {f"upperarm.{side}": (0.6, 0.0, 0.0) for side in sides}, rounds=2)
+    return rig
+
+
+def bear() -> Any:
+    """A bear that hops twice; its belly has a bone of its own."""
+    bones = {
+        "body": ((0.0, 0.05, 0.3), (0.0, 0.05, 0.9)),
+        "belly": ((0.0, 0.0, 0.52), (0.0, -0.48, 0.45)),
+    }
+    rig = armature("bear", bones)
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=48, ring_count=32, location=(0.0, 0.0, 0.6))
+    skin = bpy.context.object
+    skin.data.materials.append(paint(BROWN))
+    skin.data.shade_smooth()
+    skin.parent = rig
+    skin.matrix_parent_inverse.translation = (0.0, 0.0, 0.0)
+    groups = {name: skin.vertex_groups.new(name=name) for name in bones}
+    for number, vertex in enumerate(skin.data.vertices):
+        x, y, z = vertex.co
+        front = max(1.0 - (x / 0.85) ** 2 - ((z + 0.25) / 0.7) ** 2, 0.0) ** 0.5 * max(-y, 0.0)
+        vertex.co = 0.33 * x, 0.28 * y - 0.28 * front, 0.42 * z
+        share = float(np.clip(2.5 * front - 0.5, 0.0, 1.0))
+        for name, own in (("belly", share), ("body", 1.0 - share)):
+            if own > 0.0:
+                groups[name].add([number], own, "REPLACE")
+    skin.modifiers.new("Armature", "ARMATURE").object = rig
+    parts: list[Part] = [
+        ((0.0, -0.02, 1.13), (0.23, 0.22, 0.21), BROWN),
+        ((0.0, -0.22, 1.08), (0.11, 0.1, 0.08), PALE),
+        ((0.0, -0.32, 1.11), (0.035, 0.03, 0.025), DARK),
+    ]
+    for side in (-1.0, 1.0):
+        parts += [
+            ((0.17 * side, 0.0, 1.3), (0.08, 0.04, 0.08), BROWN),
+            ((0.08 * side, -0.21, 1.19), (0.025, 0.02, 0.03), DARK),
+            ((0.36 * side, -0.05, 0.72), (0.09, 0.1, 0.22), BROWN),
+            ((0.17 * side, 0.0, 0.16), (0.11, 0.14, 0.16), BROWN),
+        ]
+    carry(rig, "body", parts)
+    root = rig.pose.bones["body"]
+    for frame in range(1, 2 + PERIOD):
+        root.location = 0.0, HOP * (0.5 - 0.5 * cos(4.0 * pi * (frame - 1) / PERIOD)), 0.0
+        root.keyframe_insert("location", frame=frame)
     return rig
 
 

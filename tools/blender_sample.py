@@ -1,9 +1,9 @@
-"""Samples for Blender: a tail and wings in wind, hair in water, each a .blend and a picture.
+"""Samples for Blender: tail and wings in wind, hair in water, a soft belly. A .blend and a picture.
 
     python tools/blender_sample.py --engine .venv --out build/blender-sample [NAME ...]
 
 It needs Blender as a module, as `make blender-sample` installs it. A sample uses what an animator
-uses in the panel. Its picture shows a frame before the bake (left) and after it (right).
+uses in the panel. Its picture shows a frame before the run (left) and after it (right).
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from blender_characters import PERIOD, Colour, Point, bird, fox, paint, swimmer
+from blender_characters import PERIOD, Colour, Point, bear, bird, fox, paint, swimmer
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
@@ -108,6 +108,17 @@ SAMPLES = {
         wind=8.0,
         settings={"density": 60.0, "rounds": 4, "strength": radians(720.0), "follow": 0.02},
     ),
+    "belly": Sample(
+        bear,
+        "SOFT",
+        limit=60.0,
+        pictured=13,
+        camera=((3.3, -1.3, 1.0), (0.0, -0.1, 0.72)),
+        sky=(0.62, 0.76, 0.9),
+        ground=(0.22, 0.30, 0.13),
+        arrows=(),
+        settings={"flow": (0.0, 0.0, 0.0), "flesh": "FOLLOW", "stiffness": 15.0, "rounds": 4},
+    ),
 }
 
 
@@ -139,7 +150,10 @@ def make(name: str, sample: Sample, engine: str, out: Path) -> None:
     halves = [picture(sample, out)]
     job = start_job(bpy.context, engine)
     finish(name, job)
-    bpy.ops.flowborne.bake(bones="FREE")
+    if job.reaction.young:
+        bpy.ops.flowborne.flesh()
+    if not job.reaction.follows:
+        bpy.ops.flowborne.bake(bones="FREE")
     if sample.ink:
         job.start_export()
         finish(name, job)

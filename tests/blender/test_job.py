@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from blender.environment import engine_command
 from blender.job import CHARACTER, Job
-from blender.motion import read_motion
+from blender.motion import MotionError, read_motion, read_skin
 from blender.process import IDLE, JobError, State
 from blender.reaction import Reaction
 
@@ -162,3 +162,26 @@ def test_a_check_says_warnings_and_cost_before_the_run(tmp_path: Path) -> None:
     again.start()
     assert finish(again) is State.DONE, again.message
     assert fb.open_run(again.run).summary["cells"] == int(cells)
+
+
+def test_flesh_is_meshed_in_the_import_and_its_skin_is_read(tmp_path: Path) -> None:
+    """Only flesh reacts: the tail is as in the clip, and stiff flesh is near its piece at rest."""
+    job = new_job(tmp_path / "soft", frames=3, young=1e6, follows=True)
+    job.start()
+    assert finish(job) is State.DONE, job.message
+    skin = read_skin(job.run)
+    place, turned = read_motion(job.run).of(skin.body)
+    local = np.einsum("fji,fkj->fki", turned, skin.vertices - place[:, None])
+    assert skin.vertices.shape == (4, len(skin.rest), 3)
+    assert np.median(np.abs(local[0] - skin.rest)) < 0.2
+    with pytest.raises(MotionError, match="has no flesh to show"):
+        read_skin(job.run, 9)
+
+
+def test_an_engine_without_the_mesher_says_what_to_install(tmp_path: Path) -> None:
+    without = "import sys; sys.modules['pyvista'] = None; import flowborne.__main__"
+    job = new_job(tmp_path / "soft", (sys.executable, "-c", without), young=1e5)
+    job.start()
+    assert finish(job) is State.FAILED
+    assert "meshes of flesh are made by PyVista, which is not installed" in job.message
+    assert "flowborne[flesh]" in job.message

@@ -56,6 +56,29 @@ def test_simulated_water(imported: Path) -> None:
     assert (ink.kind, ink.lower, ink.upper) == ("box", *box)
 
 
+@pytest.fixture(scope="module")
+def soft(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The same with a tail of flesh."""
+    folder = tmp_path_factory.mktemp("soft")
+    rigged.write_glb(folder / "character.glb")
+    return fb.import_character(folder / "character.glb", folder / "scene", flesh=["tail"]).scene
+
+
+@pytest.mark.parametrize("simulated", [False, True])
+def test_flesh_of_bones_that_react_or_follow(soft: Path, simulated: bool) -> None:
+    """Vibrations of up to 10 Hz have ten steps; without control nothing is decided."""
+    chosen = replace(PLAIN, young=3e4, simulated=simulated)
+    for follows in (False, True):
+        scene = fb.load_scene(write_scene(soft, replace(chosen, follows=follows)))
+        (flesh,) = scene.flesh
+        assert (flesh.bones, flesh.young) == (("tail",), 3e4)
+        assert scene.time.steps_per_frame * scene.time.frames_per_second >= 100.0
+        assert scene.controlled_joints() == (() if follows else ("tail",))
+        assert len(scene.objectives) == (0 if follows else 1)
+        assert load_model(scene).flesh is not None
+    assert replace(chosen, follows=True, objective="most-drag", flow=(0.0, 0.0, 0.0)).follows
+
+
 @pytest.mark.parametrize("simulated", [False, True])
 @pytest.mark.parametrize("objective", OBJECTIVES)
 def test_every_objective_is_a_scene(imported: Path, objective: str, simulated: bool) -> None:

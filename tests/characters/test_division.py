@@ -112,6 +112,25 @@ def test_surface_with_a_hole_is_refused() -> None:
         divided(rig(), inward, "box.glb")
 
 
+def test_a_part_that_is_inside_out_is_refused_with_its_place() -> None:
+    """A cavity in another part is none, nor is one that is too small for a body."""
+    whole = trimesh.creation.box((1.0, 1.0, 1.0))
+
+    def divide(size: float, away: float) -> float:
+        other = trimesh.creation.box((size, size, size))
+        other.apply_translation((away, 0.0, 0.0))
+        faces = np.concatenate([whole.faces, other.faces[:, ::-1] + len(whole.vertices)])
+        points = np.concatenate([whole.vertices, other.vertices])
+        grey, weights = np.full((len(faces), 3), 0.5), np.ones((len(points), 1))
+        return divided(rig((-1,)), Surface(points, faces, weights, grey), "two.glb").volume
+
+    said = r"two\.glb: the mesh around \(2, 0, 0\) m, 0\.6 m long, is inside out\. Orient its faces"
+    with pytest.raises(SceneError, match=said):
+        divide(0.6, 2.0)
+    assert divide(0.6, 0.1) == pytest.approx(1.0 - 0.6**3)
+    assert divide(0.1, 2.0) == pytest.approx(1.0 - 0.1**3)
+
+
 def test_small_holes_are_closed_and_triangles_wound_alike() -> None:
     """A ball with a triangle missing, and a tenth of the others turned over."""
     ball = trimesh.creation.icosphere(subdivisions=4)

@@ -170,6 +170,9 @@ def test_model_json_says_whose_flesh_is_where(tmp_path):
     assert not np.intersect1d(triangles[of_triangles == 0], triangles[of_triangles == 1]).size
     assert [geom["covered"] for geom in written["geoms"]] == [True, False]
     assert written["flesh"]["bodies"] == [0, 1]
+    assert written["flesh"]["body_position"][1] == model.mj.body_pos[1].tolist()
+    skin = np.array(written["flesh"]["rest"])[triangles]
+    np.testing.assert_array_equal(skin, model.flesh.rest[model.flesh.surface])
     assert (written["joints"], written["joint_bodies"]) == (["hinge", "free"], [1, 2])
 
 

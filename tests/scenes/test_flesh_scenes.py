@@ -80,9 +80,9 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     made: list[str] = []
     skin = flesh_room.skin_mesh
 
-    def counting(spec, bones, thickness, size):  # type: ignore[no-untyped-def]
+    def counting(spec, bones, *given):  # type: ignore[no-untyped-def]
         made.append(" ".join(bones))
-        return skin(spec, bones, thickness, size)
+        return skin(spec, bones, *given)
 
     monkeypatch.setattr(flesh_room, "skin_mesh", counting)
     return made

@@ -148,6 +148,7 @@ def test_a_clip_in_other_units_is_told(tmp_path: Path) -> None:
     assert clip_in(tmp_path) == []
     (said,) = clip_in(tmp_path, turned=np.pi / 180.0)
     assert "those of BVH files are in degrees" in said
+    assert clip_in(tmp_path, turned=1e-7) == []  # rounding: only the root travels
     (said,) = clip_in(tmp_path, frame_time="33.3")
     assert "33.3 s, 0.03 frames per second; the unit of frame times is the second" in said
 

@@ -5,14 +5,21 @@ from __future__ import annotations
 import pickle
 from dataclasses import dataclass
 
+import mujoco
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from flowborne.coupling.step import step
+from flowborne.coupling.world import Setup, World
 from flowborne.solids.dynamics import kinematics
+from flowborne.solids.following import follow
 from flowborne.solids.model import SolidModel
+from flowborne.solids.momentum import momentum
+from flowborne.solids.tissue.growth import Tissue, add_flesh
 from flowborne.solids.wind import Wind, WindFaces, WindForce
+from flowborne_validation.flesh_bars import bar_mesh
 
 LENGTH, WIDTH, RHO, SPEED = 2.0, 0.4, 1.3, 5.0
 
@@ -101,3 +108,58 @@ def test_field_is_taken_at_each_face() -> None:
     total = wind.wrench(BLOCK, pose, np.zeros(2), 0.5)[1]
     assert total[0] == pytest.approx(2 * RHO * 9.0 * LENGTH**3 / 3, rel=1e-2)
     assert total[5] == pytest.approx(-2 * RHO * 9.0 * LENGTH**4 / 4, rel=1e-2)
+
+
+def bar() -> SolidModel:
+    """Two bones with a ball each in a bar of flesh of 0.8 m x 0.4 m x 0.2 m, centred at x = 0.4."""
+    spec = mujoco.MjSpec.from_string(
+        """<mujoco><worldbody><body name="base"><freejoint/><geom size=".05" pos=".1 0 0"/>
+        <body name="end" pos=".8 0 0"><joint/><geom size=".05" pos="-.1 0 0"/></body></body>
+        </worldbody></mujoco>"""
+    )
+    points, elements = bar_mesh((4, 2, 2), (0.8, 0.4, 0.2))
+    holders = ["base" if x < 0.1 else "end" if x > 0.7 else "" for x in points[:, 0]]
+    grown = add_flesh(spec, "bar", points, elements, Tissue(1e4, 0.3, 1e3), holders)
+    return SolidModel.with_flesh(spec, [grown], gravity=(0.0, 0.0, 0.0))
+
+
+def test_K3_drag_of_a_bar_of_flesh_in_any_wind() -> None:
+    """Each pair of its sides: 2 rho A (U.n)^2, and nothing on the bones inside."""
+    model, blow = bar(), np.array([1.0, 2.0, -3.0])
+    pose, wind = kinematics(model, model.rest().q), WindFaces((1.0, 2.0, -3.0), RHO)
+    force = wind.on_flesh(model, pose, np.zeros(model.nv), 0.0)
+    sides = np.array([0.4 * 0.2, 0.8 * 0.2, 0.8 * 0.4])
+    np.testing.assert_allclose(force.sum(axis=0), 2 * RHO * sides * np.abs(blow) * blow, rtol=1e-9)
+    assert model.geom_covered.all()
+    assert not wind.wrench(model, pose, np.zeros(model.nv), 0.0).any()
+
+
+def test_flesh_that_moves_with_the_wind_feels_nothing() -> None:
+    model = bar()
+    pose, v = kinematics(model, model.rest().q), np.zeros(model.nv)
+    v[:3] = 1.0, 2.0, -3.0
+    moving = follow(model, model.rest().q, v)
+    force = WindFaces((1.0, 2.0, -3.0), RHO).on_flesh(model, pose, moving, 0.0)
+    np.testing.assert_allclose(force, 0.0, atol=1e-20)
+
+
+def test_bodies_share_the_wind_on_flesh() -> None:
+    model = bar()
+    pose, still = kinematics(model, model.rest().q), np.zeros(model.nv)
+    every, base, end = (
+        WindFaces((0.0, 0.0, 4.0), RHO, bodies).on_flesh(model, pose, still, 0.0)
+        for bodies in (None, ("base",), ("end",))
+    )
+    np.testing.assert_allclose(base + end, every, atol=1e-12)
+    assert base[:, 2].sum() == pytest.approx(end[:, 2].sum(), rel=0.05)
+
+
+def test_a_step_in_wind_takes_the_momentum_that_the_wind_gives() -> None:
+    """F dt on free flesh and bones, and the report has the same force."""
+    model, dt = bar(), 1e-3
+    world = World.at_rest(Setup(model, winds=(WindFaces((5.0, 0.0, 0.0), RHO),)))
+    report = step(world, dt)
+    force = report.wind_wrench[:, :3].sum(axis=0)
+    assert force[0] == pytest.approx(2 * RHO * 0.08 * 25.0, rel=1e-3)
+    gained = momentum(model, world.solid)[0]
+    np.testing.assert_allclose(gained, dt * force, atol=1e-6 * dt * force[0])

@@ -11,12 +11,14 @@ therefore have a dome around the joint instead of the fan, inside the parent bod
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError, cKDTree
 
 from flowborne.base.errors import SceneError
+from flowborne.base.phrases import location
 from flowborne.characters.rig import PLAIN, Rig, Surface
 from flowborne.kernels.arrays import Array, Integers, Mesh
 from flowborne.shapes.closing import SMALL_HOLE, across_of, fans, loops_of, rims_of, wound
@@ -55,6 +57,7 @@ class Division:
     volume  m^3 inside the whole surface
     filled  width of each closed hole of the surface, m
     unsound joints that are rigid with a neighbour, as their piece alone is no body (`is_sound`)
+    soft    shapes of chains of bodies that are chosen to be flesh
     """
 
     owners: Integers
@@ -64,6 +67,7 @@ class Division:
     volume: float
     filled: tuple[float, ...] = ()
     unsound: tuple[int, ...] = ()
+    soft: tuple[Mesh, ...] = ()
 
     @property
     def bodies(self) -> tuple[int, ...]:
@@ -71,12 +75,16 @@ class Division:
         return tuple(np.flatnonzero(self.owners == np.arange(len(self.owners))).tolist())
 
 
-def divided(rig: Rig, surface: Surface, name: str, fill: bool = False) -> Division:
+def divided(
+    rig: Rig, surface: Surface, name: str, fill: bool = False, flesh: Sequence[str] = ()
+) -> Division:
     """The bodies of a character.
 
     name    of its file, for messages
     fill    whether to close holes of any size instead of small ones only
-    raises  SceneError when the surface remains open, or has no positive volume
+    flesh   names of joints whose bodies are flesh
+    raises  SceneError when the surface remains open, or has no positive volume, and for a joint of
+            flesh that is no body
     """
     whole, filled = closed(surface, name, fill)
     volume = volume_of((whole.vertices, whole.faces))
@@ -85,6 +93,7 @@ def divided(rig: Rig, surface: Surface, name: str, fill: bool = False) -> Divisi
             f"{name}: the surface encloses {volume:.3g} m^3. Orient its faces outward (in Blender: "
             "Mesh, Normals, Recalculate Outside), and use a surface that encloses a volume."
         )
+    _check_outward(whole, volume, name)
     own, _ = _pieces(rig, np.arange(len(rig.names)), whole, domed=False)
     owners, leader = _merged(rig, np.array([volume_of(piece) for piece in own]) / volume)
     unsound: list[int] = []
@@ -100,7 +109,49 @@ def divided(rig: Rig, surface: Surface, name: str, fill: bool = False) -> Divisi
     own_pieces, own_shapes = (
         {joint: meshes[joint] for joint in moves} for meshes in (pieces, shapes)
     )
-    return Division(owners, leader, own_pieces, own_shapes, volume, filled, tuple(unsound))
+    soft = _soft(rig, owners, whole, _named(rig, moves, flesh, name))
+    return Division(owners, leader, own_pieces, own_shapes, volume, filled, tuple(unsound), soft)
+
+
+def _check_outward(surface: Surface, volume: float, file: str) -> None:
+    """Raise SceneError for a connected part of a closed surface with faces inward, unless it is a
+    cavity of the others, or so small that it makes no body."""
+    points, faces = surface.vertices, surface.faces
+    part = connected(len(points), faces[:, :2].ravel(), faces[:, 1:].ravel())[faces[:, 0]]
+    volumes = np.bincount(part, np.linalg.det(points[faces]) / 6.0)
+    for wrong in np.flatnonzero(volumes < -MIN_VOLUME * volume):
+        own = points[np.unique(faces[part == wrong])]
+        if (ShapeMesh(points, faces[part != wrong]).distance(own) > 0.0).any():
+            place, size = location(own.mean(axis=0).round(6)), np.ptp(own, axis=0).max()
+            raise SceneError(
+                f"{file}: the mesh around {place}, {size:.3g} m long, is inside out. Orient its "
+                "faces outward (in Blender: Mesh, Normals, Recalculate Outside)."
+            )
+
+
+def _named(rig: Rig, moves: list[int], names: Sequence[str], file: str) -> list[int]:
+    """Joints of these names. Raises SceneError for one that is no body."""
+    bodies = {rig.names[joint]: joint for joint in moves}
+    for name in names:
+        if name not in bodies:
+            why = "has too little of the mesh" if name in rig.names else "is not there"
+            raise SceneError(
+                f"{file}: joint '{name}' cannot be flesh, because it {why}. Name some of "
+                f"{', '.join(bodies)}."
+            )
+    return [bodies[name] for name in names]
+
+
+def _soft(rig: Rig, owners: Integers, surface: Surface, joints: list[int]) -> tuple[Mesh, ...]:
+    """Shapes of the chains of these joints, each as that of one body."""
+    if not joints:
+        return ()
+    tops, parents = np.arange(len(owners)), _parents(rig, owners)
+    for joint in sorted(joints):
+        if parents[joint] in joints:
+            tops[joint] = tops[parents[joint]]
+    _, shapes = _pieces(rig, tops[owners], surface)
+    return tuple(shapes[top] for top in np.unique(tops[joints]).tolist())
 
 
 def is_sound(mesh: Mesh) -> bool:
@@ -289,10 +340,10 @@ def _pieces(
     for joint in range(len(owners)):
         parts = [(points, faces[of_face == joint])]
         parts += [(caps[d][0], caps[d][1][:, ::-1]) for d in below[joint] if d in caps]
-        pieces.append(_joined([*parts, caps[joint]] if joint in caps else parts))
+        pieces.append(joined([*parts, caps[joint]] if joint in caps else parts))
         if domed and joint in rims:
             dome = domes(points, rims[joint], rig.position[joint])
-            domed_pieces.append(_joined([*parts, dome]))
+            domed_pieces.append(joined([*parts, dome]))
         else:
             domed_pieces.append(pieces[-1])
     return pieces, domed_pieces
@@ -338,7 +389,7 @@ def _clipped(polygon: Array, height: Array) -> Array:
     return np.array(kept).reshape(-1, polygon.shape[1])
 
 
-def _joined(parts: list[Mesh]) -> Mesh:
+def joined(parts: Sequence[Mesh]) -> Mesh:
     """Triangles of several meshes as one mesh, without coincident pairs of opposite winding."""
     corners = np.concatenate([points[faces].reshape(-1, 3) for points, faces in parts])
     points, number = np.unique(corners, axis=0, return_inverse=True)

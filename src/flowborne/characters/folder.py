@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import tomli_w
 
-from flowborne.base.arguments import NUMBER, PATH, TEXT, or_none, takes
+from flowborne.base.arguments import NUMBER, PATH, TEXT, or_none, several, takes
 from flowborne.base.errors import SceneError
 from flowborne.characters.division import Division, divided
+from flowborne.characters.flesh import CharacterFlesh, flesh_of
 from flowborne.characters.limits import check_work
 from flowborne.characters.model import as_cycle, clip_of, model_files, posed
 from flowborne.characters.rig import (
@@ -28,10 +30,13 @@ from flowborne.characters.source import clip_number, read_source
 from flowborne.kernels.arrays import Array
 from flowborne.motion.bvh import bvh_text
 from flowborne.motion.clip import Clip
+from flowborne.scenes.bodies import bones_of
 from flowborne.scenes.build import build
+from flowborne.scenes.flesh import meshed
 from flowborne.scenes.load import load_scene
 from flowborne.scenes.warn_speed import steps_for_bodies
 from flowborne.solids.skins import skinned
+from flowborne.solids.tissue.mesh_file import mesh_bytes
 
 MARGIN = 0.35
 """Water on every side of the region reached by the clip, relative to its longest side."""
@@ -41,6 +46,9 @@ DENSITIES = (1e-3, 1e6)
 
 MAX_STEM_BYTES = 150
 """Length of the file name's stem that all files of a character share."""
+
+YOUNG = 5e4
+"""Young's modulus of flesh, N/m^2: that of relaxed muscle and fat."""
 
 CELLS = 64
 """Cells along the longest side of the domain."""
@@ -61,7 +69,13 @@ class Imported:
 
 
 @takes(
-    file=PATH, out=PATH, clip=or_none(TEXT), animations=or_none(PATH), density=NUMBER, scale=NUMBER
+    file=PATH,
+    out=PATH,
+    clip=or_none(TEXT),
+    animations=or_none(PATH),
+    density=NUMBER,
+    scale=NUMBER,
+    flesh=several(TEXT, "names of joints"),
 )
 def import_character(
     file: str | Path,
@@ -72,6 +86,7 @@ def import_character(
     density: float = 1000.0,
     scale: float = 1.0,
     fill: bool = False,
+    flesh: Sequence[str] = (),
 ) -> Imported:
     """Make a scene of a rigged character in a new folder.
 
@@ -85,6 +100,7 @@ def import_character(
     density     kg/m^3
     scale       of the character's size, 0.01 for a file in centimetres
     fill        whether to close holes of any size instead of small ones only
+    flesh       names of joints whose bodies are flesh around a thin core
     raises      SceneError when a file cannot be used, a library is missing, or the scene exists;
                 OSError when the folder cannot be written
     """
@@ -123,17 +139,19 @@ def import_character(
             f"{moves.name} has none of the joints of {path.name}, which are "
             f"{', '.join(rig.names)}. Give clips of the same skeleton."
         )
-    division = divided(rig, surface, path.name, fill)
+    division = divided(rig, surface, path.name, fill, flesh)
+    soft = flesh_of(rig, division, flesh, path.name)
     sizes = tuple(size_notes(surface.vertices, density * division.volume, scale, path.name))
     pose = posed(rig, skeleton, action)
     once, strays = clip_of(rig, division, pose)
     cycle = as_cycle(once)
     motion = cycle or once
-    files = model_files(name, rig, division, surface, density)
+    files = model_files(name, rig, division, surface, density, soft)
     files[f"{name}.bvh"] = bvh_text(motion).encode()
     called = printable(f"{path.name}, {moving.clips[number]}")
-    loop, reach = cycle is not None, _reach(rig, surface, pose)
-    files[scene.name] = _scene(name, called, motion, loop, reach).encode()
+    text = partial(_scene, name, called, motion, cycle is not None, _reach(rig, surface, pose))
+    tissue = "" if soft is None else _flesh_table(name, rig, soft, density)
+    files[scene.name] = (text() + tissue).encode()
     for made, content in files.items():
         target = Path(out) / made
         target.parent.mkdir(parents=True, exist_ok=True)
@@ -143,7 +161,9 @@ def import_character(
     except SceneError:
         scene.unlink()  # a scene that cannot run must not block the next import
         raise
-    scene.write_bytes(_scene(name, called, motion, loop, reach, steps).encode())
+    scene.write_bytes((text(steps) + tissue).encode())
+    if soft is not None:
+        _keep_mesh(scene)
     left_out = printable(", ".join(source.left_out))
     notes = (
         *hung,
@@ -254,6 +274,34 @@ impulse = "none"
 [output]
 exports = ["{name}.glb"]
 """
+
+
+def _flesh_table(name: str, rig: Rig, flesh: CharacterFlesh, density: float) -> str:
+    """The table of the flesh in a scene file."""
+    bones, neighbours = (
+        ", ".join(_quoted(rig.names[joint]) for joint in joints)
+        for joints in (flesh.cores, flesh.neighbours)
+    )
+    return f"""
+[[flesh]]
+name = "flesh"
+bones = [{bones}]
+neighbours = [{neighbours}]
+surface = "{name}-meshes/flesh.obj"
+size = {flesh.edge:.4g}
+mesh = "{name}-flesh.npz"
+young = {YOUNG:g}
+density = {density:g}
+"""
+
+
+def _keep_mesh(scene: Path) -> None:
+    """Write the mesh of the flesh of a scene to the file that the scene names."""
+    loaded = load_scene(scene)
+    (table,) = loaded.flesh
+    assert table.mesh is not None
+    mesh, recipe = meshed(bones_of(loaded), table, loaded.folder)
+    (loaded.folder / table.mesh).write_bytes(mesh_bytes(mesh, recipe))
 
 
 def _quoted(text: str) -> str:

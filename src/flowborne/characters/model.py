@@ -13,6 +13,7 @@ from PIL import Image
 from scipy.spatial.transform import Rotation
 
 from flowborne.characters.division import Division
+from flowborne.characters.flesh import CharacterFlesh, without
 from flowborne.characters.rig import Action, Rig, Surface
 from flowborne.kernels.arrays import Array, Integers, Mesh
 from flowborne.motion.clip import Clip
@@ -30,12 +31,18 @@ Element = ElementTree.Element
 
 
 def model_files(
-    name: str, rig: Rig, division: Division, surface: Surface, density: float
+    name: str,
+    rig: Rig,
+    division: Division,
+    surface: Surface,
+    density: float,
+    flesh: CharacterFlesh | None = None,
 ) -> dict[str, bytes]:
     """Files of a model, name -> content, with a body for each joint of the rig.
 
     A body has the name and frame of its joint. Bodies of moving joints have a ball joint of the
-    same name, the root a free joint; the others are rigid with their parent body.
+    same name, the root a free joint; the others are rigid with their parent body. Bodies of flesh
+    have their cores only; the surface of the flesh is a file, and no part of the skin.
 
     density  kg/m^3 of all pieces
     """
@@ -60,7 +67,14 @@ def model_files(
             ElementTree.SubElement(body, "freejoint", name=own)
         else:
             ElementTree.SubElement(body, "joint", name=own, type="ball")
-        if len(division.pieces[joint][1]):
+        if flesh is not None and joint in flesh.cores:
+            ends, radius = flesh.cores[joint]
+            ends = (ends - rig.position[joint]) @ rig.rotation[joint]
+            core = {"type": "capsule", "fromto": _numbers(ends)}
+            if np.ptp(ends, axis=0).max() < 1e-3 * radius:
+                core = {"type": "sphere", "pos": _numbers(ends[0])}
+            ElementTree.SubElement(body, "geom", {"name": own, "size": f"{radius:.9g}"} | core)
+        elif len(division.pieces[joint][1]):
             file = f"{name}-meshes/{joint}.obj"
             shape, piece = (
                 ((vertices - rig.position[joint]) @ rig.rotation[joint], faces)
@@ -74,6 +88,9 @@ def model_files(
             data = _numbers(np.array([mass.volume, *mass.center_mass]))
             ElementTree.SubElement(custom, "numeric", name=DISPLACED + own, data=data)
             ElementTree.SubElement(body, "geom", name=own, mesh=own)
+    if flesh is not None:
+        files[f"{name}-meshes/flesh.obj"] = _obj(flesh.surface)
+        surface = without(surface, division, flesh)
     files[f"{name}.xml"] = _text(root)
     files[f"{name}-skin.xml"] = _text(_skins(name, rig, surface))
     return files

@@ -184,6 +184,10 @@ def import_(
     fill: Annotated[
         bool, typer.Option("--fill", help="Close holes of any size, not only small ones.")
     ] = False,
+    flesh: Annotated[
+        list[str] | None,
+        typer.Option(metavar="JOINT", help="Joint whose body is flesh; may be repeated."),
+    ] = None,
 ) -> None:
     """Make a scene of a rigged character and its clip."""
     if not density > 0.0:
@@ -192,7 +196,14 @@ def import_(
 
     with writing(out):
         made = import_character(
-            file, out, clip=clip, animations=animations, density=density, scale=scale, fill=fill
+            file,
+            out,
+            clip=clip,
+            animations=animations,
+            density=density,
+            scale=scale,
+            fill=fill,
+            flesh=flesh or (),
         )
     print(f"written: {made.scene}")
     for note in made.notes:

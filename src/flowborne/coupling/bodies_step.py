@@ -15,7 +15,7 @@ from flowborne.coupling.drives import joint_command
 from flowborne.coupling.operators import generalised, twists
 from flowborne.coupling.report import StepReport, timed
 from flowborne.coupling.solve import solve_bodies
-from flowborne.coupling.step_report import fluid_forces, report_bodies
+from flowborne.coupling.step_report import fluid_forces, on_bodies, report_bodies
 from flowborne.coupling.stream import forces_on, winds_on
 from flowborne.coupling.world import World
 from flowborne.fluid.transport import parts_for
@@ -89,8 +89,11 @@ def step_bodies(world: World, dt: float, command: JointCommand) -> StepReport:
     if world.setup.winds or world.setup.forces or world.told.forces:
         pose = kinematics(model, world.solid.q)
         wind, applied = winds_on(world, pose), forces_on(world, pose, world.time + dt)
-        force = generalised(pose, np.append(wind + applied, np.zeros(pose.vertices.size)))
-        known |= {"centre": pose.mass_centre, "wind_wrench": wind, "applied_wrench": applied}
+        push = wind.copy()
+        push[: applied.size] += applied.ravel()
+        force = generalised(pose, push)
+        known |= {"centre": pose.mass_centre, "applied_wrench": applied}
+        known |= {"wind_wrench": on_bodies(pose, model.flesh, wind)}
     driven = equations(world, before, force, command, dt)
     solved = solve_bodies(driven, command.torque_limit)
     world.solid.v[:] = solved.v

@@ -104,12 +104,12 @@ def known_forces(
         pressed = hydrostatic_push(pose.vertices, surface, model.gravity, density)
         buoyancy = np.append(buoyancy, pressed)
     wind, jet = winds_on(world, pose), jet_wrench(jets, density, model.nbody)
-    push = buoyancy + half / dt
+    push = buoyancy + half / dt + wind
     applied = forces_on(world, pose, world.time + dt) + thrust_wrench(discs, model.nbody)
-    push[: 6 * model.nbody] += (wind + applied + jet).ravel()
+    push[: 6 * model.nbody] += (applied + jet).ravel()
     return push, {
         "buoyancy_wrench": on_bodies(pose, model.flesh, buoyancy),
-        "wind_wrench": wind,
+        "wind_wrench": on_bodies(pose, model.flesh, wind),
         "applied_wrench": applied,
         "jet_wrench": jet,
         "expelled": dt * sum(jet.rate for jet in jets),

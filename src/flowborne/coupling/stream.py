@@ -59,15 +59,19 @@ class WindStream:
 
 
 def winds_on(world: World, pose: Kinematics) -> Array:
-    """(nbody, 6) wrench of the simple winds on each body about the world origin."""
-    total = np.zeros((len(pose.body_position), 6))
+    """(k,) push of the simple winds: wrench on each body about the world origin, then force on each
+    vertex of flesh."""
+    model, v, time = world.setup.solid, world.solid.v, world.time
+    wrench, force = np.zeros((len(pose.body_position), 6)), np.zeros_like(pose.vertices)
     for wind in world.setup.winds:
         blowing: Wind = wind
         if isinstance(wind, WindStream) and world.fluid is not None:
             field = Sampled(world.fluid.velocity, world.flow()[0].grid)
             blowing = WindFaces(field, wind.density, wind.bodies)
-        total += blowing.wrench(world.setup.solid, pose, world.solid.v, world.time)
-    return total
+        wrench += blowing.wrench(model, pose, v, time)
+        if model.flesh is not None and isinstance(blowing, WindFaces):
+            force += blowing.on_flesh(model, pose, v, time)
+    return np.append(wrench, force)
 
 
 def forces_on(world: World, pose: Kinematics, time: float) -> Array:

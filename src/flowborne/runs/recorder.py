@@ -17,6 +17,7 @@ from flowborne.shapes.mesh import ShapeMesh
 from flowborne.solids.dynamics import Kinematics, kinematics
 from flowborne.solids.flesh import Flesh
 from flowborne.solids.geoms import rest_poses
+from flowborne.solids.mjcf import MjModel
 from flowborne.solids.model import SolidModel
 from flowborne.solids.skins import clad_bodies, skins_of
 
@@ -153,7 +154,7 @@ def write_model(
             "places": {name: _entries(solid, name) for name in names},
             "grid": grid,
             "geoms": _geoms(solid),
-            "flesh": None if solid.flesh is None else _flesh(solid.flesh),
+            "flesh": None if solid.flesh is None else _flesh(solid.flesh, solid.mj),
             "skins": [] if solid.slab else _skins(solid),
             "frames_per_second": frames_per_second,
             "wind": wind,
@@ -206,11 +207,17 @@ def _skins(solid: SolidModel) -> list[dict[str, Any]]:
     return listed
 
 
-def _flesh(flesh: Flesh) -> dict[str, Any]:
-    """The skin: triangles of the vertices in the states, and the bodies that carry flesh."""
+def _flesh(flesh: Flesh, mj: MjModel) -> dict[str, Any]:
+    """The skin: triangles of the vertices in the states, and the bodies that carry flesh; both also
+    at rest."""
+    bodies = np.flatnonzero(flesh.carried.any(axis=0))
+    position, rotation, _, _ = rest_poses(mj)
     return {
         "names": list(flesh.names),
         "triangles": np.searchsorted(on_skin(flesh), flesh.surface).tolist(),
         "of_triangles": flesh.of_surface.tolist(),
-        "bodies": np.flatnonzero(flesh.carried.any(axis=0)).tolist(),
+        "rest": flesh.rest[on_skin(flesh)].tolist(),
+        "bodies": bodies.tolist(),
+        "body_position": position[bodies].tolist(),
+        "body_rotation": rotation[bodies].tolist(),
     }

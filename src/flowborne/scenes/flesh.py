@@ -47,6 +47,7 @@ class FleshTable(Table):
 
     name       the flesh's own
     bones      bodies of the model that lie inside and hold it
+    neighbours  bodies into which it reaches: they hold the points of it that are inside them
     thickness  m: it is a skin as thick as this around the bones
     surface    instead of a thickness: file of a closed surface (.obj, .stl, .ply, .off, .glb, and
                whatever else trimesh reads) in the axes of the model at rest; the flesh fills it
@@ -65,6 +66,7 @@ class FleshTable(Table):
 
     name: PlainName
     bones: Annotated[tuple[Text, ...], Field(min_length=1)]
+    neighbours: tuple[Text, ...] = ()
     thickness: Positive | None = None
     surface: FileName | None = None
     size: Positive | None = None
@@ -127,10 +129,11 @@ def meshed(spec: MjSpec, table: FleshTable, folder: Path) -> tuple[FleshMesh, st
     if recipe not in _made:
         assert table.size is not None
         if table.surface is not None:
-            made = surface_mesh(folder / table.surface, spec, table.bones, table.size)
+            path = folder / table.surface
+            made = surface_mesh(path, spec, table.bones, table.size, table.neighbours)
         else:
             assert table.thickness is not None
-            made = skin_mesh(spec, table.bones, table.thickness, table.size)
+            made = skin_mesh(spec, table.bones, table.thickness, table.size, table.neighbours)
         _made[recipe] = made
     return _made[recipe], recipe
 
@@ -163,11 +166,13 @@ def _recipe(spec: MjSpec, table: FleshTable, folder: Path) -> str:
     """All inputs of a mesh, as JSON: shapes and poses of the bones at rest, and parameters."""
     recipe = {
         "bones": list(table.bones),
-        "shapes": digest(spec, table.bones),
+        "shapes": digest(spec, (*table.bones, *table.neighbours)),
         "thickness": table.thickness,
         "size": table.size,
         "rules": [FIDELITY, THICKNESSES, HELD, JOINT, JOINT_EDGES, ASTRAY, SAME],
     }
+    if table.neighbours:
+        recipe["neighbours"] = list(table.neighbours)
     if table.surface is not None:
         recipe["surface"] = hashlib.sha256(surface_bytes(folder / table.surface)).hexdigest()
     return json.dumps(recipe)

@@ -47,6 +47,9 @@ more."""
 FULL_TURN = 2.0 * math.pi
 """A range of all joints that ends within this many degrees is one in radians by its looks."""
 
+STILL = 0.01
+"""Degrees, or rad in such a file: smaller turns are rounding, as where only the root travels."""
+
 FEWEST_STEPS = 2.0 * math.pi
 """Steps of a period, omega dt = 1. The scheme (Newmark's average acceleration, docs/method/
 bodies.md) has periods that are (omega dt)^2 / 12 too long, here 8 %; gravity makes them as much too
@@ -194,7 +197,8 @@ def clips(scene: Scene, setup: Setup) -> Iterator[str]:
             "second; the unit of frame times is the second, as 0.0333 for 30 frames per second"
         )
     largest = 2.0 * math.acos(min(1.0, float(np.abs(clip.rotations[:, 1:, 0]).min(initial=1.0))))
-    if file.lower().endswith(".bvh") and 0.0 < largest <= math.radians(FULL_TURN):
+    still, turned = math.radians(STILL), math.radians(FULL_TURN)
+    if file.lower().endswith(".bvh") and still < largest <= turned:
         yield (
             f"[clip]: no joint of {file} turns by more than {math.degrees(largest):.3g}, as in a "
             "file whose angles are in radians; those of BVH files are in degrees"

@@ -45,7 +45,7 @@ def surfaces(model: SolidModel) -> Patches:
 
     Boxes and meshes keep their exact area. Round shapes are inscribed polyhedra: their area is too
     small by 0.04 % in a slab, by 0.2 % (cylinder) to 0.8 % (sphere) in three dimensions. Patches
-    inside another geometry of the same body are kept.
+    inside another geometry of the same body are kept; geometries inside flesh have none.
     """
     patches = _known.get(model)
     if patches is None:
@@ -56,6 +56,8 @@ def surfaces(model: SolidModel) -> Patches:
 def _surfaces(model: SolidModel) -> Patches:
     bodies, centres, vectors = [np.zeros(0, np.int64)], [np.zeros((0, 3))], [np.zeros((0, 3))]
     for g in np.argsort(model.geom_body, kind="stable"):
+        if model.geom_covered[g]:
+            continue
         shape = model.geom_shape[g]
         centre, vector = (
             _outline(shape.section(*model.rest_pose(g))) if model.slab else shape.patches()

@@ -65,6 +65,28 @@ class WindFaces:
         wrench = pushed(patches.body, patches.screw, patches.area, *pose, twist, wind)
         return _on_bodies(model, self.density * wrench, self.bodies)
 
+    def on_flesh(self, model: SolidModel, pose: Kinematics, v: Array, time: float) -> Array:
+        """(n, 3) force on each vertex of flesh, N: a third of that on each triangle of its skin.
+
+        Of flesh that other bodies carry too, the chosen bodies have their share of the force.
+        """
+        assert model.flesh is not None
+        faces, velocity = model.flesh.surface, (pose.vertex_jacobian @ v).reshape(-1, 3)
+        a, b, c = np.moveaxis(pose.vertices[faces], 1, 0)
+        across = 0.5 * cross(b - a, c - a)  # area times normal
+        area = np.maximum(np.linalg.norm(across, axis=1), np.finfo(float).tiny)
+        wind = self.velocity
+        blowing = wind((a + b + c) / 3.0, time) if callable(wind) else np.array(wind)
+        inflow = ((blowing - velocity[faces].mean(axis=1)) * across).sum(axis=1)
+        third = self.density * (np.abs(inflow) * inflow / area**2)[:, None] * across / 3.0
+        force = np.zeros_like(pose.vertices)
+        np.add.at(force, faces, third[:, None])
+        if self.bodies is not None:
+            force *= model.flesh.carried[:, [model.body(name) for name in self.bodies]].sum(axis=1)[
+                :, None
+            ]
+        return force
+
 
 @dataclass(frozen=True)
 class WindForce:

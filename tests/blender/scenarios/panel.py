@@ -2,12 +2,12 @@
 
 from types import SimpleNamespace
 
-from blender.jobs import job_of
+from blender.jobs import JOBS, job_of
 from blender.operators import FlowborneRun
 from blender.panel import FlowbornePanel
 from blender.process import State
 
-from stage import bpy, character, new_scene, recorded
+from stage import add_skin, bpy, character, new_scene, recorded
 
 
 class Layout:
@@ -45,8 +45,17 @@ assert "Check" in drawn()
 assert "resolution" not in drawn()
 rig.flowborne.simulated = True
 assert "resolution" in drawn()
+assert "stiffness" not in drawn()
+rig.flowborne.flesh = "REACT"
+assert {"stiffness", "objective"} <= {*drawn()}
+rig.flowborne.flesh = "FOLLOW"
+assert "objective" not in drawn()
 run = recorded(rig)
 assert "done, frame 11/11" in drawn()
+assert "flowborne.flesh" not in drawn()
+add_skin(rig, run)
+JOBS.clear()
+assert "flowborne.flesh" in drawn()
 job = job_of(rig.flowborne, "")
 (run / "states" / "000011.npz").unlink()
 for state, shown in (

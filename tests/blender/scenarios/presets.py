@@ -10,8 +10,15 @@ NAMES = {
     "WING": ["wing.L", "LeftWing", "primary_feathers.001"],
     "ARMS": ["DEF-upper_arm.L", "mixamorig:LeftForeArm", "forearm.R", "upperarm_l", "hand.L"],
     "SPINE": ["spine.001", "Spine2", "chest", "UPPER_CHEST"],
+    "SOFT": ["belly", "ear.L", "DEF-breast.R"],
 }
-EACH = [name for names in NAMES.values() for name in names] + ["Armor", "handle", "tailor", "neck"]
+EACH = [name for names in NAMES.values() for name in names] + [
+    "Armor",
+    "handle",
+    "tailor",
+    "neck",
+    "heart",
+]
 assert {which: preset(EACH, which) for which in PRESETS} == NAMES
 
 new_scene()

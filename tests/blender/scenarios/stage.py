@@ -214,6 +214,59 @@ def recorded(
     return job / "run"
 
 
+def add_skin(armature: Any, run: Path, unit: float = 1.0, wobble: float = 0.1) -> np.ndarray:
+    """Flesh around tail and tip in a recorded run: its skin is the mesh behind the trunk, which
+    each frame moves with a bone and wobbles by up to `wobble` m. Returns the numbers of the mesh's
+    vertices that are those of the skin."""
+    body = bpy.data.objects[f"{armature.name} body"]
+    points = np.array([vertex.co for vertex in body.data.vertices])
+    own = np.flatnonzero(points[:, 1] > 0.95)
+    faces = [(0, 1, 2, 3), tuple(range(len(own) - 1, len(own) - 5, -1))]
+    faces += [
+        (at + a, at + 4 + a, at + 4 + (a + 1) % 4, at + (a + 1) % 4)
+        for at in range(0, len(own) - 4, 4)
+        for a in range(4)
+    ]
+    triangles = [(f[0], f[n], f[n + 1]) for f in faces for n in (1, 2)]
+    scale = unit * armature.matrix_world.to_scale()[0]
+    rest = scale * points[own]
+    heads = scale * np.array([bone.head_local for bone in armature.data.bones])
+    axes = np.array([bone.matrix_local.to_3x3() for bone in armature.data.bones])
+    carrier = np.where(points[own, 1] < JOINTS[2], 1, 2)
+    local = np.einsum("kji,kj->ki", axes[carrier], rest - heads[carrier])
+    elsewhere = np.array([7.0, 0.0, 0.0])  # the model is at rest there
+    model = json.loads((run / "model.json").read_text())
+    model["flesh"] = {
+        "triangles": triangles,
+        "rest": (rest + elsewhere).tolist(),
+        "bodies": [0, 1, 2, 3],
+        "body_position": [[0.0, 0.0, 0.0], *(heads + elsewhere).tolist()],
+        "body_rotation": [np.eye(3).tolist(), *axes.tolist()],
+    }
+    (run / "model.json").write_text(json.dumps(model))
+    for k, path in enumerate(sorted((run / "states").iterdir())):
+        state = dict(np.load(path))
+        shaken = local + wobble * np.sin(0.7 * k + 20.0 * local / scale) * [1.0, 0.3, 0.7]
+        turned = np.einsum("kij,kj->ki", state["body_rotation"][carrier + 1], shaken)
+        state["flesh_vertices"] = state["body_position"][carrier + 1] + turned
+        np.savez(path, **state)
+    job = run.parent / "job.json"
+    job.write_text(json.dumps(json.loads(job.read_text()) | {"young": 5e4}))
+    return own
+
+
+def shown(body: Any, frame: float) -> np.ndarray:
+    """(n, 3) vertices of a mesh in the world, as evaluated at a frame."""
+    bpy.context.scene.frame_set(math.floor(frame), subframe=frame % 1.0)
+    drawn = body.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    return np.array([drawn.matrix_world @ vertex.co for vertex in drawn.data.vertices])
+
+
+def skin_of(run: Path, frame: int, unit: float = 1.0) -> np.ndarray:
+    """(k, 3) the skin of flesh in a frame of a run, in units of Blender."""
+    return np.load(run / "states" / f"{frame:06}.npz")["flesh_vertices"] / unit
+
+
 def force_on(frame: int) -> np.ndarray:
     """(4, 3) N on the world and the bodies of a recorded run; none on the world and the trunk."""
     return np.outer([0.0, 0.0, 1.0, 2.0], [1.0, 0.1 * frame, -0.5])

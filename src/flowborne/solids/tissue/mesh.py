@@ -83,17 +83,22 @@ class FleshMesh:
 
 
 def skin_mesh(
-    spec: mujoco.MjSpec, bones: Sequence[str], thickness: float, size: float
+    spec: mujoco.MjSpec,
+    bones: Sequence[str],
+    thickness: float,
+    size: float,
+    neighbours: Sequence[str] = (),
 ) -> FleshMesh:
     """Flesh up to `thickness` m outside the union of some bodies.
 
     It has the mirror planes that exchange some of these bodies.
 
-    bones   names of the bodies
-    size    length of edges, m; shorter where the curvature of the surface requires it
-    raises  ValueError for an unknown body, a body without a geom, a bone that is too thin, a skin
-            that is too thin for its bones or too large for its edges, when the mesher fails, and
-            for a bone that holds no point
+    bones       names of the bodies
+    size        length of edges, m; shorter where the curvature of the surface requires it
+    neighbours  names of bodies that hold the points inside them too
+    raises      ValueError for an unknown body, a body without a geom, a bone that is too thin, a
+                skin that is too thin for its bones or too large for its edges, when the mesher
+                fails, and for a bone that holds no point
     """
     chosen = bones_of(spec, bones)
     _check_bones(chosen)
@@ -107,10 +112,17 @@ def skin_mesh(
         )
     tolerance = min(FIDELITY * size, THICKNESSES * min(thickness, chosen.thinnest))
     skin = contour(chosen, thickness, min(_pitch(chosen, size), 0.5 * thickness))
-    return _fleshed(skin, None, chosen, size, tolerance)
+    holding = bones_of(spec, [*bones, *neighbours])
+    return _fleshed(skin, None, chosen, holding, size, tolerance)
 
 
-def surface_mesh(path: Path, spec: mujoco.MjSpec, bones: Sequence[str], size: float) -> FleshMesh:
+def surface_mesh(
+    path: Path,
+    spec: mujoco.MjSpec,
+    bones: Sequence[str],
+    size: float,
+    neighbours: Sequence[str] = (),
+) -> FleshMesh:
     """Flesh up to the closed surface in a file, in world axes at rest; as `skin_mesh`.
 
     raises  ValueError as `skin_mesh`, for a file without a closed surface, and for a bone outside
@@ -122,7 +134,8 @@ def surface_mesh(path: Path, spec: mujoco.MjSpec, bones: Sequence[str], size: fl
     surface = read_surface(path)
     _check_elements(np.ptp(surface[0], axis=0), size)
     check_covers(path, surface, chosen, _pitch(chosen, size), tolerance)
-    return _fleshed(surface, surface, chosen, size, tolerance)
+    holding = bones_of(spec, [*bones, *neighbours])
+    return _fleshed(surface, surface, chosen, holding, size, tolerance)
 
 
 def _check_bones(bones: Bones) -> None:
@@ -169,9 +182,12 @@ def _pitch(bones: Bones, size: float) -> float:
 
 
 def _fleshed(
-    outside: Mesh, own: Mesh | None, bones: Bones, size: float, tolerance: float
+    outside: Mesh, own: Mesh | None, bones: Bones, holding: Bones, size: float, tolerance: float
 ) -> FleshMesh:
-    """Flesh between an outer surface and bones; `own` is the surface if it is the user's."""
+    """Flesh between an outer surface and bones; `own` is the surface if it is the user's.
+
+    holding  the bones and their neighbours
+    """
     inside = contour(bones, 0.0, _pitch(bones, size))
     chamber = chamber_of(bones, inside[0], tolerance, own)
     hollow = _hollow(outside, inside)
@@ -179,7 +195,7 @@ def _fleshed(
     ends = points[with_middles(len(points), elements)[0]]
     edge = float(np.median(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)))
     joint = max(JOINT * bones.thinnest, JOINT_EDGES * edge)
-    mesh = FleshMesh(points, elements, _holders(bones, points, HELD * tolerance, joint))
+    mesh = FleshMesh(points, elements, _holders(holding, points, HELD * tolerance, joint))
     _check_held(mesh, bones, size)
     return mesh
 
