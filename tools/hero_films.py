@@ -4,8 +4,8 @@
 
 A film is a run of flowborne, exported as USD, that tools/hero_scenes.py renders with Blender as a
 module. All steps are in build/hero-films/NAME. What is there stays: a stopped film goes on.
-CHARACTERS is a folder with files of Mesh2Motion (https://mesh2motion.org, CC0): fish-whale.glb and
-shark-animations.glb, bird-eagle.glb and bird-animations.glb. `swimmer` needs none.
+CHARACTERS is a folder with files of https://github.com/Mesh2Motion/mesh2motion-app (CC0):
+fish-whale.glb, shark-animations.glb, bird-eagle.glb, bird-animations.glb. `swimmer` needs none.
 """
 
 from __future__ import annotations

@@ -103,12 +103,12 @@ def whale(folder: Path) -> tuple[range, Update]:
 def swimmer(folder: Path) -> tuple[range, Update]:
     """Above sand on which waves focus light; the ink is a volume. A quarter as large as its run."""
     skin = read(folder / "run.usd")
-    camera = (3.1, -2.3, -0.9), (0.0, 0.0, 0.0)
+    camera = (2.9, -2.6, -0.75), (0.0, 0.0, -0.1)
     water = Water(len(skin.poses), sun=(-0.3, 0.1, 0.9), surface=3.0, clear=(0.85, 0.9, 0.92))
     water.add()
     water.add_rays(camera, (5.5, 7.5, 10.0), 0.8)
     water.add_sand(-2.2)
-    add_camera(camera, lens=27.0)
+    add_camera(camera, lens=33.0)
     body = add_body(replace(skin, colours=[CORAL] * len(skin.colours)), water, 1)
     ink = bpy.data.volumes.new("ink")
     add_object("ink", ink).scale = (QUARTER,) * 3
@@ -118,7 +118,7 @@ def swimmer(folder: Path) -> tuple[range, Update]:
         put(body, QUARTER * skin.poses[frame])
         ink.filepath = str(folder / "run_dye" / f"run_{frame:04d}.vdb")
 
-    return range(53, 125), update
+    return range(86, 158), update
 
 
 def eagle(folder: Path) -> tuple[range, Update]:
