@@ -9,10 +9,13 @@ BPY ?= 5.0.1
 BLENDER_PYTHON ?= python3.11
 BPY_VENV := build/bpy-$(BPY)
 
+# Folder of rigged characters: `make hero-films NAMES="whale" CHARACTERS=models`
+CHARACTERS ?= .
+
 # Every process would compile the package anew, a fifth of what it takes to start.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: baselines bench-history bench-pages blender blender-sample browser chapters clean closeness cross-checks demo dist docs exporters films fuzz gallery gltf-validator imports joss lint messages notebooks paper readme recordings same-figures size speed strangers test validation-page workflows
+.PHONY: baselines bench-history bench-pages blender blender-sample browser chapters clean closeness cross-checks demo dist docs exporters films fuzz gallery gltf-validator hero-films imports joss lint messages notebooks paper readme recordings same-figures size speed strangers test validation-page workflows
 
 demo: $(VENV)/installed
 	$(BIN)/flowborne run ns-block-drag-max --out runs/ns-block-drag-max --replace
@@ -39,6 +42,11 @@ blender-sample: $(VENV)/installed
 	test -x $(BPY_VENV)/bin/python || $(BLENDER_PYTHON) -m venv $(BPY_VENV)
 	$(BPY_VENV)/bin/python -m pip install --quiet bpy==$(BPY)
 	$(BPY_VENV)/bin/python tools/blender_sample.py --engine $(VENV) --out build/blender-sample
+
+hero-films: $(VENV)/installed-test
+	test -x $(BPY_VENV)/bin/python || $(BLENDER_PYTHON) -m venv $(BPY_VENV)
+	$(BPY_VENV)/bin/python -m pip install --quiet bpy==$(BPY)
+	nice $(BIN)/python tools/hero_films.py --blender $(BPY_VENV)/bin/python --characters "$(CHARACTERS)" --out build/hero-films $(NAMES)
 
 dist: $(VENV)/installed-test
 	$(BIN)/python -m pip install --quiet --group dist

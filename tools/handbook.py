@@ -158,6 +158,13 @@ def accessible(app: Sphinx, page: str, template: str, context: dict[str, Any], t
     context["furo_navigation_tree"] = shown.replace(role, f'{role} aria-level="2"')
 
 
+def lazily(app: Sphinx, tree: nodes.document, page: str) -> None:
+    """Load pictures and films in lists when they come into view."""
+    for item in tree.findall(nodes.list_item):
+        for image in item.findall(nodes.image):
+            image["loading"] = "lazy"
+
+
 class Diagram(SphinxDirective):
     """A block of Mermaid, which needs a script to be drawn: its text, folded away."""
 
@@ -189,6 +196,7 @@ def setup(app: Sphinx) -> dict[str, bool]:
     app.connect("autodoc-process-docstring", structured)
     app.connect("autodoc-process-signature", readable)
     app.connect("autodoc-skip-member", skipped)
+    app.connect("doctree-resolved", lazily)
     app.connect("html-page-context", accessible, priority=900)
     app.add_directive("mermaid", Diagram)
     app.add_html_math_renderer("mathml", (inline_formula, None), (block_formula, None))
