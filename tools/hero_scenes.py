@@ -127,10 +127,10 @@ def eagle(folder: Path) -> tuple[range, Update]:
     skin = read(folder / "run.usd")
     poses = looped(skin.poses, cycle)
     poses += np.array([0.0, 0.0, 1.7]) - poses.mean((0, 1))
-    camera = (2.2, -2.4, 2.1), (0.0, 0.15, 1.6)
+    camera = (2.2, -2.4, 2.1), (0.0, 0.15, 1.68)
     sea = Sea(frames, 24.0, speed=(0.0, -8.0), waves=1.3, camera=camera)
     sea.add_light(fill=(0.8, -0.9, 0.5))
-    add_camera(camera, lens=40.0)
+    add_camera(camera, lens=38.0)
     focus = bpy.context.scene.camera.data.dof
     focus.use_dof, focus.focus_distance, focus.aperture_fstop = True, 3.4, 1.0
     body = add_body(replace(skin, colours=[*map(brown, skin.colours)]), sea, 2)
