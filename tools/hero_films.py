@@ -32,9 +32,6 @@ from hero_specks import drifting
 TOOLS = Path(__file__).parent
 DOCS = TOOLS.parent / "docs"
 
-RATE = 24.0
-"""Frames per second."""
-
 SAMPLES = 6
 """Rays of a pixel, before denoising."""
 
@@ -73,6 +70,7 @@ class Film:
     scene     built-in one, or that of a character
     settings  changes of the scene, as those of `--set`
     specks    number of specks that drift with the flow
+    rate      frames per second of the run, and of the film
     """
 
     frames: int
@@ -81,6 +79,7 @@ class Film:
     scene: str | Character
     settings: Mapping[str, str] = field(default_factory=dict)
     specks: int = 0
+    rate: float = 24.0
 
 
 def reaction(free: tuple[str, ...], strength: float, follow: float) -> dict[str, str]:
@@ -118,7 +117,7 @@ FILMS = {
         },
         specks=500,
     ),
-    "swimmer": Film(frames=158, shown=72, width=480, scene="swimmer"),
+    "swimmer": Film(frames=158, shown=72, width=480, scene="swimmer", rate=30.0),
     "eagle": Film(
         frames=56,
         shown=56,
@@ -156,7 +155,8 @@ def main() -> None:
         subprocess.run(
             [*scenes, "--size", str(FILMS[name].width), "--samples", str(SAMPLES)], check=True
         )
-        encode(sorted((folder / "frames").glob("*.png")), DOCS / f"hero-{name}.webp")
+        frames = sorted((folder / "frames").glob("*.png"))
+        encode(frames, DOCS / f"hero-{name}.webp", FILMS[name].rate)
 
 
 def simulate(film: Film, folder: Path, characters: Path) -> None:
@@ -197,7 +197,7 @@ def import_character(character: Character, folder: Path, characters: Path) -> st
     return str(made.scene)
 
 
-def encode(pictures: list[Path], path: Path) -> None:
+def encode(pictures: list[Path], path: Path, rate: float) -> None:
     """Write pictures as an animated WebP of at most MAX_BYTES, if a quality gives it.
 
     Each frame is whole (`kmax`): frames that keep parts of earlier ones show blocks in soft light.
@@ -210,7 +210,7 @@ def encode(pictures: list[Path], path: Path) -> None:
             "WEBP",
             save_all=True,
             append_images=others,
-            duration=round(1000.0 / RATE),
+            duration=round(1000.0 / rate),
             loop=0,
             quality=quality,
             method=6,

@@ -39,4 +39,6 @@ def test_a_film_is_small_and_moves(name: str) -> None:
         assert image.n_frames == film.shown
         first = np.asarray(image.convert("RGB"), float)
         image.seek(film.shown // 2)
+        image.load()
+        assert image.info["duration"] == round(1000.0 / film.rate)
         assert np.abs(np.asarray(image.convert("RGB"), float) - first).mean() > 1.0
