@@ -20,7 +20,7 @@ from mathutils.bvhtree import BVHTree
 from .character import in_frames, meshes_of
 from .motion import Array, Integers, Motion, MotionError, Skin
 from .nodes import add_node
-from .stand_in import FLESH, parents_of
+from .stand_in import FLESH, parents_of, remove_flesh
 
 
 def add_flesh(
@@ -169,9 +169,9 @@ def _before_armature(context: Any, mesh: Any, bones: list[str]) -> tuple[Array, 
     number, copy = _number(mesh), mesh.copy()
     context.scene.collection.objects.link(copy)
     try:
-        for n, modifier in enumerate([*copy.modifiers]):
-            if n >= number or modifier.name.startswith(FLESH):
-                copy.modifiers.remove(modifier)
+        for modifier in [*copy.modifiers][number:]:
+            copy.modifiers.remove(modifier)
+        remove_flesh(copy)
         evaluated = copy.evaluated_get(context.evaluated_depsgraph_get()).to_mesh()
         points = np.empty(3 * len(evaluated.vertices), np.float32)
         evaluated.vertices.foreach_get("co", points)
@@ -220,8 +220,7 @@ def _add_modifier(mesh: Any, count: int, chosen: Integers, offsets: Array, first
     data.vertices.foreach_set("co", rows.ravel())
     data.attributes.new("number", "INT", "POINT").data.foreach_set("value", numbers)
     carrier = bpy.data.objects.new(FLESH, data)
-    for earlier in [each for each in mesh.modifiers if each.name.startswith(FLESH)]:
-        mesh.modifiers.remove(earlier)
+    remove_flesh(mesh)
     place, modifier = _number(mesh), mesh.modifiers.new(FLESH, "NODES")
     modifier.node_group = _nodes(carrier, count, offsets.shape, first)
     mesh.modifiers.move(len(mesh.modifiers) - 1, place)

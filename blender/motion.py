@@ -115,14 +115,20 @@ def read_motion(run: Path, start: int = 0) -> Motion:
     raises  MotionError when there is no frame, or a file cannot be read
     """
     try:
-        model: dict[str, Any] = json.loads((run / "model.json").read_text(encoding="utf-8"))
-        states = [_read(path) for path in sorted((run / "states").glob("[0-9]*.npz"))[start:]]
+        model, paths = _files(run, start)
+        states = [_read(path) for path in paths]
         if not states:
             raise ValueError("it has no states")
         arrays = (np.array(values, np.float64) for values in zip(*states, strict=True))
         return Motion(tuple(model["bodies"]), tuple(model["joints"]), *arrays)
     except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
         raise MotionError(f"{run} has no frames to bake ({error}): resume the run") from error
+
+
+def _files(run: Path, start: int) -> tuple[dict[str, Any], list[Path]]:
+    """What model.json has, and the files of the states from a frame on."""
+    model: dict[str, Any] = json.loads((run / "model.json").read_text(encoding="utf-8"))
+    return model, sorted((run / "states").glob("[0-9]*.npz"))[start:]
 
 
 def _read(path: Path, names: Iterable[str] = STATE) -> list[Array]:
@@ -152,8 +158,8 @@ def read_skin(run: Path, start: int = 0) -> Skin:
     raises  MotionError when the run has no flesh, or a file cannot be read
     """
     try:
-        model = json.loads((run / "model.json").read_text(encoding="utf-8"))
-        flesh, paths = model.get("flesh"), sorted((run / "states").glob("[0-9]*.npz"))[start:]
+        model, paths = _files(run, start)
+        flesh = model.get("flesh")
         if flesh is None or not paths:
             raise ValueError("it has no flesh: choose it in Flesh, and start a new run")
         body = flesh["bodies"].index(next(filter(None, flesh["bodies"])))

@@ -110,7 +110,7 @@ class FlowborneRun(_Watch, bpy.types.Operator):
     def execute(self, context: Any) -> set[str]:
         with _reported(self):
             if self.resume:
-                job = job_of(armature_of(context).flowborne, engine_of(context))
+                job = _last(context)[1]
                 job.engine = engine_command(engine_of(context))
                 job.start()
             else:
@@ -128,7 +128,7 @@ class FlowborneInk(_Watch, bpy.types.Operator):
 
     def execute(self, context: Any) -> set[str]:
         with _reported(self):
-            job = job_of(armature_of(context).flowborne, engine_of(context))
+            job = _last(context)[1]
             job.engine = engine_command(engine_of(context))
             job.start_export()
             return self._watch(context, job)
@@ -149,10 +149,15 @@ class FlowborneCancel(bpy.types.Operator):
         return {"FINISHED"}
 
 
+def _last(context: Any) -> tuple[Any, Job]:
+    """The active armature and its last job. Raises one of ERRORS."""
+    armature = armature_of(context)
+    return armature, job_of(armature.flowborne, engine_of(context))
+
+
 def _result(context: Any) -> tuple[Any, Job, Motion]:
     """The active armature, its last job, and what it gives. Raises one of ERRORS."""
-    armature = armature_of(context)
-    job = job_of(armature.flowborne, engine_of(context))
+    armature, job = _last(context)
     return armature, job, read_motion(job.run).after(job.reaction.lead, job.reaction.loop)
 
 
@@ -180,7 +185,7 @@ class FlowborneFlesh(bpy.types.Operator):
 
     def execute(self, context: Any) -> set[str]:
         with _reported(self):
-            armature, job, _ = _result(context)
+            armature, job = _last(context)
             reaction = job.reaction
             motion, skin = read_motion(job.run, reaction.lead), read_skin(job.run, reaction.lead)
             first, unit = reaction.first, reaction.unit

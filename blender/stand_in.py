@@ -25,6 +25,12 @@ SAME_PLACE = 1e-4
 """Largest difference of rest poses of two bones in the same place, in lengths of the bone."""
 
 
+def remove_flesh(mesh: Any) -> None:
+    """Remove our modifiers from a mesh."""
+    for modifier in [each for each in mesh.modifiers if each.name.startswith(FLESH)]:
+        mesh.modifiers.remove(modifier)
+
+
 @contextmanager
 def stand_in(
     context: Any, armature: Any, meshes: Iterable[Any], name: str
@@ -59,8 +65,7 @@ def stand_in(
             skin.parent, skin.parent_type = copy, "OBJECT"
             skin.matrix_parent_inverse = copy.matrix_world.inverted()
             skin.matrix_world = mesh.matrix_world
-            for modifier in [each for each in skin.modifiers if each.name.startswith(FLESH)]:
-                skin.modifiers.remove(modifier)
+            remove_flesh(skin)
             modifiers = [each for each in skin.modifiers if each.type == "ARMATURE"]
             for modifier in modifiers or [skin.modifiers.new(name, "ARMATURE")]:
                 modifier.object = copy

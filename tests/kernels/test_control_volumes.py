@@ -19,11 +19,11 @@ from flowborne.kernels.control_volumes import (
     listed_kinds,
     mark_cut,
     merge_small,
-    merged,
     neighbour,
     share_velocity,
     sort_faces,
 )
+from flowborne.kernels.lists import merged
 
 from .cut_cells import face_shape
 from .references.control_volumes import (

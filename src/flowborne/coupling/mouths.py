@@ -32,7 +32,7 @@ from flowborne.fluid.sides.far import Strength
 from flowborne.fluid.transport import NO_INLETS
 from flowborne.kernels.arrays import Array, Integers, Mask
 from flowborne.kernels.carry import Inlets, share_at_faces
-from flowborne.kernels.control_volumes import merged
+from flowborne.kernels.lists import merged
 from flowborne.solids.dynamics import Kinematics
 
 DEPTH = 3.0

@@ -37,9 +37,10 @@ from flowborne.fluid.ghosts import join_ends, packed_sides, plane, planes
 from flowborne.fluid.grid import Grid
 from flowborne.kernels.arrays import Array, FaceGrid, Faces, Integers, Marks, Three
 from flowborne.kernels.carry import Exchange, Inlets, Scratch, Volumes, carry
-from flowborne.kernels.control_volumes import Transfers, merged
+from flowborne.kernels.control_volumes import Transfers
 from flowborne.kernels.eddies import exchange, exchanges_near
 from flowborne.kernels.flux import GHOSTS, Fluxes, Padded, largest_crossing
+from flowborne.kernels.lists import merged
 
 COURANT = 0.8
 """Cells that the flow may cross in a substep, the axes added up: Heun's method with values of third

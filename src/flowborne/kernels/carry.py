@@ -29,12 +29,11 @@ from flowborne.kernels.control_volumes import (
     join_small,
     level,
     mark_cut,
-    merged,
     share_velocity,
     stride,
 )
 from flowborne.kernels.dye import face_of
-from flowborne.kernels.face_masses import add_transfers, give, place_of
+from flowborne.kernels.face_masses import add_transfers, give
 from flowborne.kernels.faces import flat
 from flowborne.kernels.flux import (
     CLEAR,
@@ -49,6 +48,7 @@ from flowborne.kernels.flux import (
     stage,
 )
 from flowborne.kernels.jit import kernel
+from flowborne.kernels.lists import merged, place_of
 
 AXIS, UPPER, NORMAL, TANGENTIAL, SUPPLIES, FIRST, IRROTATIONAL = range(7)
 """Columns of the table of sides: where the side lies, a of the velocity across and along it and

@@ -14,9 +14,7 @@ from numba import prange
 from flowborne.kernels.arrays import PERIODIC, PRESCRIBED, Array, FaceGrid, Integers, Marks, Three
 from flowborne.kernels.faces import mean_row
 from flowborne.kernels.jit import inlined, kernel
-
-AHEAD = 16
-"""Places that a list is gone through before it is searched."""
+from flowborne.kernels.lists import place_of
 
 DRIVEN, PART, SHUT, UNEVEN, LISTED = 1, 2, 4, 8, 16
 """Kinds of faces: pressure acts on it; its control volume is not whole; pressure does not act on
@@ -119,46 +117,6 @@ def neighbour(shape: Three | Integers, wraps: Three | Integers, f: int, way: int
     return int(all_beside(shape, wraps, f)[way])
 
 
-@kernel
-def place_of(listed: Integers, f: int, near: int) -> int:
-    """Place of the first of a list in ascending order that is not below f; quick where that is a
-    little after the place `near`."""
-    low, high = 0, listed.size
-    if near == 0 or listed[near - 1] < f:
-        low, stop = near, min(near + AHEAD, high)
-        while low < stop and listed[low] < f:
-            low += 1
-        if low < stop or low == high:
-            return low
-    while low < high:
-        middle = (low + high) // 2
-        if listed[middle] < f:
-            low = middle + 1
-        else:
-            high = middle
-    return low
-
-
-@kernel
-def merged(one: Integers, other: Integers) -> tuple[Integers, Integers, Integers]:
-    """What is in one of two lists in ascending order or in both, in one such list; and where in it
-    the elements of each are."""
-    found, a, b, count = np.empty(one.size + other.size, np.int64), 0, 0, 0
-    first, second = np.empty(one.size, np.int64), np.empty(other.size, np.int64)
-    while a < one.size or b < other.size:
-        beyond = b == other.size or (a < one.size and one[a] < other[b])
-        both = not beyond and a < one.size and one[a] == other[b]
-        found[count] = one[a] if beyond else other[b]
-        if beyond or both:
-            first[a] = count
-            a += 1
-        if not beyond:
-            second[b] = count
-            b += 1
-        count += 1
-    return found[:count].copy(), first, second
-
-
 @inlined
 def scale_to_one(parts: Array) -> bool:
     """Make the sum of parts 1, in place; False where there are none."""
@@ -202,8 +160,7 @@ def find_targets(
     cell_flat, pushed = cells.reshape(-1), kinds.reshape(-1)
     for n in range(small.size):
         f = small[n]
-        for way in range(6):
-            targets[n, way] = f
+        targets[n, :] = f
         at, beside = indices(shape, f), all_beside(shape, wraps, f)
         around, ahead, shut = 0.0, 0.0, 0.0
         for way in range(6):

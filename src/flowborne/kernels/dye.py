@@ -22,8 +22,9 @@ import numpy as np
 from numba import prange
 
 from flowborne.kernels.arrays import ROUNDING, Array, Faces, Integers, Marks, Three
-from flowborne.kernels.control_volumes import both_beside, indices, place_of, stride
+from flowborne.kernels.control_volumes import both_beside, indices, stride
 from flowborne.kernels.jit import inlined, kernel
+from flowborne.kernels.lists import place_of
 
 WIDTH = 64
 """Lines of cells that one thread goes through side by side."""

@@ -23,12 +23,12 @@ from flowborne.kernels.control_volumes import (
     indices,
     listed_kinds,
     merge_small,
-    place_of,
     sort_faces,
     stride,
 )
 from flowborne.kernels.flux import Stage, in_line
 from flowborne.kernels.jit import inlined, kernel
+from flowborne.kernels.lists import place_of
 
 KEPT = 0.5
 """Part of the smaller of what one holds and of a h^3 that it keeps at least in a sweep."""

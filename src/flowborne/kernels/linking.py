@@ -44,7 +44,7 @@ class Linked(JITCodeLibrary):
         return 0
 
 
-OF_KERNELS = "no_cpython_wrapper", "no_cfunc_wrapper", "forceinline"
+OF_KERNELS = "no_cpython_wrapper", "forceinline"
 """Options in which kernels differ, which what they call does not get."""
 
 
@@ -60,9 +60,7 @@ class KernelFlags(Flags):
         return hash(KernelFlags)
 
     def __eq__(self, other: object) -> bool:
-        if isinstance(other, KernelFlags):
-            return self.given == other.given
-        return super().__eq__(other)
+        return isinstance(other, KernelFlags) and self.given == other.given
 
 
 def forget_constants(dispatcher: Any) -> None:

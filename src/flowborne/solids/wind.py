@@ -82,9 +82,8 @@ class WindFaces:
         force = np.zeros_like(pose.vertices)
         np.add.at(force, faces, third[:, None])
         if self.bodies is not None:
-            force *= model.flesh.carried[:, [model.body(name) for name in self.bodies]].sum(axis=1)[
-                :, None
-            ]
+            chosen = [model.body(name) for name in self.bodies]
+            force *= model.flesh.carried[:, chosen].sum(axis=1, keepdims=True)
         return force
 
 
