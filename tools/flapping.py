@@ -123,11 +123,16 @@ def outline(points: int = 40) -> Array:
     return np.concatenate([upper, upper[1:-1] * (1.0, -1.0)])
 
 
+def write_mesh(path: Path, axis: int, ends: tuple[float, float]) -> None:
+    """The section as a mesh that spans from one place along an axis to another, m."""
+    section = WING.chord * outline()
+    points = np.concatenate([np.insert(section, axis, end, axis=1) for end in ends])
+    trimesh.convex.convex_hull(points).export(path)
+
+
 def write_scene(folder: Path, reduced: float, cells: int) -> Path:
     """Scene, model and mesh of the wing, with cells across its chord."""
-    x, z = WING.chord * outline().T
-    ends = [np.stack([x, np.full_like(x, y), z], 1) for y in (WING.root, WING.root + WING.span)]
-    trimesh.convex.convex_hull(np.concatenate(ends)).export(folder / "wing.obj")
+    write_mesh(folder / "wing.obj", 1, (WING.root, WING.root + WING.span))
     (folder / "wing.xml").write_text(MODEL.format(incidence=WING.incidence), encoding="utf-8")
     far = f'{{ kind = "far", velocity = [{WING.speed}, 0.0, 0.0] }}'
     longest = max(np.subtract(UPPER, LOWER))

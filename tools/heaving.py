@@ -12,11 +12,10 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
-import trimesh
 
 import flowborne as fb
 from committed import ROOT
-from flapping import outline
+from flapping import write_mesh
 from markdown_text import table as markdown
 
 FOUND = ROOT / "docs" / "heaving.json"
@@ -80,8 +79,7 @@ def lift(cells: int, incidence: float, rising: float, sinking: float, place: flo
     stream that rises (m/s), from a place across the stream (cells)."""
     with TemporaryDirectory() as made:
         folder = Path(made)
-        ends = [np.pad(outline(), ((0, 0), (0, 1)), constant_values=z) for z in (-0.5, 0.5)]
-        trimesh.convex.convex_hull(np.concatenate(ends)).export(folder / "wing.obj")
+        write_mesh(folder / "wing.obj", 2, (-0.5, 0.5))
         (folder / "wing.xml").write_text(MODEL.format(turned=-incidence), encoding="utf-8")
         text = SCENE.format(
             frames=8 * CHORDS,

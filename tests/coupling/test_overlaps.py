@@ -35,7 +35,8 @@ LINKS = mjcf(
 )
 CAPSULE = "<geom type='capsule' fromto='0 0 0 .4 0 0' size='.13'/>"
 BOX = "<geom type='box' pos='.2 0 0' size='.27 .13 .16'/>"
-GRIDS = Grid.slab(44, 44, 0.06, (-1.32, -1.32)), Grid((34, 34, 10), 0.08, (-1.36, -1.36, -0.4))
+GRIDS = Grid.slab(48, 48, 0.06, (-1.44, -1.44)), Grid((36, 36, 10), 0.08, (-1.44, -1.44, -0.4))
+"""Longer than the links: a body that reaches into a side is pushed off it."""
 
 
 def even_push(world: World) -> Array:
