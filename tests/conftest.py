@@ -3,6 +3,7 @@
 import os
 from collections import Counter
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -135,3 +136,10 @@ def small_scene(tmp_path):
     path = folder / "small.toml"
     path.write_text(SCENE)
     return path
+
+
+@pytest.fixture
+def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Runs of a study are made by threads, which start at once."""
+    made = "flowborne.studies.workers.ProcessPoolExecutor"
+    monkeypatch.setattr(made, lambda most, **_: ThreadPoolExecutor(most))

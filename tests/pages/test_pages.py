@@ -180,6 +180,7 @@ def module(request: pytest.FixtureRequest) -> Iterator[ModuleType]:
             LOADED.pop(block.file[:-3], None)
 
 
+@pytest.mark.usefixtures("in_this_process")
 @pytest.mark.parametrize("page", WITH_BLOCKS, ids=[path.stem for path in WITH_BLOCKS])
 def test_what_a_page_says_works(
     page: Path, module: ModuleType, kept: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
-
-from flowborne.studies import workers
 
 MASS = (
     '<mujoco><worldbody><body name="mass"><joint name="along" type="slide" axis="1 0 0" '
@@ -50,12 +47,6 @@ kind = "latin-hypercube"
 count = 12
 seed = 3
 """
-
-
-@pytest.fixture
-def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Runs of a study are made by threads, which start at once."""
-    monkeypatch.setattr(workers, "ProcessPoolExecutor", lambda most, **_: ThreadPoolExecutor(most))
 
 
 @pytest.fixture

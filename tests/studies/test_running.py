@@ -126,6 +126,7 @@ def test_the_command_states_the_runs_first_and_writes_only_then(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(workers, "CONNECT_SECONDS", 0.5)  # until no scheduler has answered
     for name in cli.BLAS_THREADS:
         monkeypatch.setenv(name, "1")
     replaced(study_file, ("count = 12", "count = 2"))
