@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
+from flowborne.scenes import warn_units
 from flowborne.scenes.build import Built, build
-from flowborne.scenes.load import check_scene, library, load_scene, read_scene, scene_names
+from flowborne.scenes.load import library, load_scene, scene_names
 from flowborne.scenes.schema import Scene
-from flowborne.scenes.warn import accepted_of, warnings_of
+from flowborne.scenes.warn import WARNINGS, accepted_of, warnings_of
 
 NAMES = scene_names()
 UNCONTROLLED = (
@@ -30,8 +31,8 @@ UNCONTROLLED = (
 
 @cache
 def loaded(name: str) -> Scene:
-    """A built-in scene, read once for all tests; one of them checks it."""
-    return read_scene(library() / f"{name}.toml")
+    """A built-in scene, loaded and checked once for all tests."""
+    return load_scene(name)
 
 
 def test_the_list_of_scenes_is_what_lies_in_the_library() -> None:
@@ -40,8 +41,7 @@ def test_the_list_of_scenes_is_what_lies_in_the_library() -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_scene_is_sound_and_says_what_it_shows(name: str) -> None:
-    assert check_scene(name) == []
-    scene = loaded(name)
+    scene = loaded(name)  # raises what is wrong with it
     assert scene.name == name
     assert scene.figure
     assert scene.description
@@ -105,6 +105,13 @@ def test_no_scene_warns_about_itself_and_each_says_why(scene: Scene, built: Buil
         assert len(warning.split(". Accepted: ")[1]) > 20
 
 
+def test_no_scene_is_in_another_unit(scene: Scene, built: Built) -> None:
+    """Nor does it accept a warning that it is."""
+    kinds = [kind for kind in WARNINGS if kind.__module__ == warn_units.__name__]
+    assert len(kinds) == 9
+    assert [w for kind in kinds for w in kind(scene, built.world.setup)] == []
+
+
 def test_two_worlds_of_a_scene_are_equal_and_share_nothing(scene: Scene, built: Built) -> None:
     first, second = built.world.arrays(), build(scene).world.arrays()
     assert first.keys() == second.keys()
@@ -116,7 +123,7 @@ def test_two_worlds_of_a_scene_are_equal_and_share_nothing(scene: Scene, built: 
 def test_effort_scenes_come_to_rest_within_their_frames() -> None:
     """K1: at rest tan(psi) = wind / weight; the film lasts longer than the way there."""
     for name in ("block-effort-wind", "block-effort-weak-wind"):
-        scene = load_scene(name)
+        scene = loaded(name)
         made = build(scene)
         model = made.world.setup.solid
         weight = model.body_mass[model.body("block")] * 9.81

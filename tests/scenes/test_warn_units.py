@@ -13,9 +13,9 @@ import flowborne as fb
 from flowborne.base.errors import SceneError
 from flowborne.scenes import warn_units
 from flowborne.scenes.build import build
-from flowborne.scenes.load import load_scene, scene_names
+from flowborne.scenes.load import load_scene
 from flowborne.scenes.notes import notes_of
-from flowborne.scenes.warn import WARNINGS, warnings_of
+from flowborne.scenes.warn import warnings_of
 
 MODEL = """
 <mujoco>
@@ -65,15 +65,6 @@ def swung(tmp_path: Path) -> Swung:
 
 def said(scene: fb.Scene) -> list[str]:
     return warnings_of(scene, build(scene).world.setup)
-
-
-@pytest.mark.parametrize("name", scene_names())
-def test_no_built_in_scene_is_in_another_unit(name: str) -> None:
-    scene = load_scene(name)
-    setup = build(scene).world.setup
-    kinds = [kind for kind in WARNINGS if kind.__module__ == warn_units.__name__]
-    assert len(kinds) == 9
-    assert [w for kind in kinds for w in kind(scene, setup)] == []
 
 
 def test_a_sound_scene_without_a_fluid_has_no_warning(swung: Swung) -> None:
