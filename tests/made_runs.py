@@ -38,6 +38,21 @@ lower = [-0.2, -0.2, -0.2]
 upper = [0.2, 0.2, 0.2]
 """
 
+MASS = (
+    '<mujoco><worldbody><body name="mass"><joint name="along" type="slide" axis="1 0 0" '
+    'stiffness="4"/><geom type="sphere" size="0.1" mass="1"/></body></worldbody></mujoco>'
+)
+
+SPRING = """
+[time]
+frames_per_second = 10.0
+frames = 5
+[solids]
+model = "spring.xml"
+[initial]
+positions = { along = 1.0 }
+"""
+
 
 def run(scene, out, **options):
     return flowborne.run(scene, out, **{"film": False, "workers": 1} | options)
@@ -77,3 +92,10 @@ def drift_scene(folder):
     (folder / "drifter.xml").write_text(DRIFTER)
     (folder / "drift.toml").write_text(DRIFT)
     return folder / "drift.toml"
+
+
+def spring_scene(folder):
+    """File of a scene of a mass on a spring, whose runs take milliseconds and need few kernels."""
+    (folder / "spring.xml").write_text(MASS)
+    (folder / "spring.toml").write_text(SPRING)
+    return folder / "spring.toml"

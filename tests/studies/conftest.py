@@ -6,20 +6,7 @@ from pathlib import Path
 
 import pytest
 
-MASS = (
-    '<mujoco><worldbody><body name="mass"><joint name="along" type="slide" axis="1 0 0" '
-    'stiffness="4"/><geom type="sphere" size="0.1" mass="1"/></body></worldbody></mujoco>'
-)
-
-SPRING = """
-[time]
-frames_per_second = 10.0
-frames = 5
-[solids]
-model = "spring.xml"
-[initial]
-positions = { along = 1.0 }
-"""
+from ..made_runs import spring_scene
 
 STUDY = """
 scene = "spring.toml"
@@ -52,8 +39,7 @@ seed = 3
 @pytest.fixture
 def study_file(tmp_path: Path) -> Path:
     """Path of a study of twelve short runs, in a folder with its scene."""
-    (tmp_path / "spring.xml").write_text(MASS)
-    (tmp_path / "spring.toml").write_text(SPRING)
+    spring_scene(tmp_path)
     path = tmp_path / "swing.toml"
     path.write_text(STUDY)
     return path

@@ -15,7 +15,7 @@ import flowborne.studies.error_bars as error_bars
 from flowborne import Refinement
 from flowborne.sim.endings import RunOutcome
 
-from .conftest import MASS
+from ..made_runs import MASS
 
 
 @pytest.mark.parametrize("order", [0.7, 1.0, 2.0, 3.0])
