@@ -31,15 +31,15 @@ def said(capsys, *arguments):
     return end.value.code, capsys.readouterr().err
 
 
-@pytest.mark.parametrize("option", [{"resume": True}, {"replace": True}])
-def test_a_second_run_into_the_folder_of_one_that_goes_on_is_refused(small_scene, tmp_path, option):
+def test_a_second_run_into_the_folder_of_one_that_goes_on_is_refused(small_scene, tmp_path):
     out = tmp_path / "run"
     process = start([small_scene, "--out", out, "--frames", "100000", "--no-film"])
     try:
-        wait_for_rows(process, out / "history.csv", 3)
-        with pytest.raises(RunFolderError, match=r"being written into .*another folder"):
-            run(small_scene, out, **option)
-        wait_for_rows(process, out / "history.csv", 6)
+        for rows, option in ((3, "resume"), (6, "replace")):
+            wait_for_rows(process, out / "history.csv", rows)
+            with pytest.raises(RunFolderError, match=r"being written into .*another folder"):
+                run(small_scene, out, **{option: True})
+        wait_for_rows(process, out / "history.csv", 9)
     finally:
         process.send_signal(signal.SIGINT)
         process.communicate()
