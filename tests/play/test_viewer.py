@@ -46,7 +46,7 @@ def until(viewer: PlayViewer, reached: Callable[[], bool]) -> None:
     while not reached():
         assert monotonic() - began < 20.0
         viewer.tick(0.01)
-        viewer.wait(0.01)
+        viewer.wait(0.001)
 
 
 def stepped(viewer: PlayViewer, frames: int) -> None:
