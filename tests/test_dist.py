@@ -36,7 +36,6 @@ def files(source: Path, *kinds: str) -> set[str]:
 DATA = files(ROOT, ".toml", ".xml", ".npz", ".js")
 """Scenes, models, meshes and the script of a page."""
 
-FOUND = interpreters()
 PRESENT = f"{sys.version_info.major}.{sys.version_info.minor}"
 
 
@@ -127,14 +126,20 @@ def test_the_validation_is_found_when_it_is_installed(
     assert "Measure the speed" in flowborne(fresh, tmp_path, "bench", "--help")
 
 
+@pytest.fixture(scope="module")
+def found() -> dict[str, str]:
+    """Version of each Python of this machine -> its interpreter."""
+    return interpreters()
+
+
 @pytest.mark.parametrize("version", [v for v in SUPPORTED if v != PRESENT])
 def test_the_wheel_suits_other_pythons(
-    archives: tuple[Path, Path], tmp_path: Path, version: str
+    archives: tuple[Path, Path], found: dict[str, str], tmp_path: Path, version: str
 ) -> None:
     """It installs, all of it compiles without a warning, and its first module says the version."""
-    if version not in FOUND:
+    if version not in found:
         pytest.skip(f"this machine has no Python {version}")
-    python = environment(FOUND[version], tmp_path / "environment")
+    python = environment(found[version], tmp_path / "environment")
     install(python, archives[1], "--no-deps", "--no-index", "--no-compile")
     (package,) = (tmp_path / "environment").rglob("site-packages/flowborne")
     compiling = [python, "-W", "error", "-m", "compileall", "-q", str(package)]

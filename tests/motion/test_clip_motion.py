@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 import re
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -87,21 +88,26 @@ MANNERS: dict[str, dict[str, Any]] = {
     "cycle blended": {"clip": CIRCLE, "loop": True, "blend": 0.3},
     "cycle smooth": {"clip": CIRCLE, "loop": True, "blend": 0.3, "smooth": 6.0},
 }
-MOTIONS = {name: motion(**options) for name, options in MANNERS.items()}
+
+
+@cache
+def moving(manner: str) -> TrajectoryClip:
+    """The motion of a manner, made once for all tests that leave it as it is."""
+    return motion(**MANNERS[manner])
 
 
 @settings(max_examples=300, deadline=None)
-@given(st.sampled_from(sorted(MOTIONS)), st.floats(0.001, 8.0))
+@given(st.sampled_from(sorted(MANNERS)), st.floats(0.001, 8.0))
 def test_velocity_is_the_derivative_of_position(name: str, time: float) -> None:
-    prescribed = MOTIONS[name]
+    prescribed = moving(name)
     if abs(time - prescribed.length) < 1e-3 and not prescribed.blend and prescribed.stride is None:
         return  # where a clip without a blend stops at once
     assert_allclose(prescribed.velocity(time), rate(prescribed, time, 2e-5), rtol=1e-6, atol=1e-5)
 
 
-@pytest.mark.parametrize("name", sorted(MOTIONS))
+@pytest.mark.parametrize("name", sorted(MANNERS))
 def test_velocity_is_the_derivative_where_one_piece_goes_over_into_the_next(name: str) -> None:
-    m = MOTIONS[name]
+    m = moving(name)
     cycles = [m.length * n + part for n in (1, 2, 5) for part in (0.0, m.overlap)]
     ends = cycles if m.stride else [m.length - m.blend / 2.0, m.length + m.blend / 2.0]
     starts = [0.0, m.blend]
@@ -114,7 +120,7 @@ def test_velocity_is_the_derivative_where_one_piece_goes_over_into_the_next(name
 
 @pytest.mark.parametrize("name", ["blended", "looped", "cycle blended", "trimmed"])
 def test_blended_motion_starts_and_ends_at_rest(name: str) -> None:
-    m = MOTIONS[name]
+    m = moving(name)
     assert np.all(m.velocity(-1.0) == 0.0)
     assert_allclose(m.velocity(1e-5), 0.0, atol=1e-4)
     assert np.array_equal(m.position(-3.0), m.position(0.0))
@@ -144,7 +150,7 @@ def test_blend_starts_from_the_pose_given_at_the_place_and_heading_of_the_clip()
 
 
 def test_blend_goes_the_short_way_whatever_the_sign_of_a_quaternion() -> None:
-    plain = MOTIONS["plain"]
+    plain = moving("plain")
     for sign in (-1.0, 1.0):
         pose = whole(plain, 0.0)
         pose[MODEL.positions_of("hip")] *= sign
@@ -159,7 +165,7 @@ def test_blend_goes_the_short_way_whatever_the_sign_of_a_quaternion() -> None:
 
 
 def test_clip_slows_down_along_its_own_path() -> None:
-    plain, braked = MOTIONS["plain"], MOTIONS["blended"]
+    plain, braked = moving("plain"), moving("blended")
     assert_allclose(braked.position(2.3), plain.position(2.0), atol=1e-12)
     times = np.linspace(1.7, 2.3, 60)
     path = np.array([plain.position(t)[:2] for t in np.linspace(1.7, 2.0, 3000)])
@@ -172,7 +178,7 @@ def test_clip_slows_down_along_its_own_path() -> None:
 
 
 def test_trim_is_the_same_motion_from_a_later_time() -> None:
-    plain, late = MOTIONS["plain"], motion(start=0.31, stop=1.77)
+    plain, late = moving("plain"), motion(start=0.31, stop=1.77)
     for time in (0.0, 0.2, 1.0, 1.459):
         assert_allclose(late.position(time), plain.position(0.31 + time), atol=1e-12)
         assert_allclose(late.velocity(time), plain.velocity(0.31 + time), atol=1e-12)
@@ -180,7 +186,7 @@ def test_trim_is_the_same_motion_from_a_later_time() -> None:
 
 
 def test_whole_cycles_go_round_in_a_circle() -> None:
-    m = MOTIONS["cycle"]
+    m = moving("cycle")
     assert m.length == pytest.approx(1.0)
     for time in (0.1, 0.7, 3.25):
         assert_allclose(whole(m, time + 1.0)[7:], whole(m, time)[7:], atol=1e-9)
@@ -205,12 +211,12 @@ def test_straight_cycles_go_on_for_ever() -> None:
 
 
 def test_seam_of_an_open_clip_keeps_to_ground_and_heading() -> None:
-    m = MOTIONS["looped"]
+    m = moving("looped")
     assert m.length == pytest.approx(1.5)
     heights = [m.position(time)[2] for time in np.arange(0.0, 60.0, 0.1)]
     assert min(heights) > 0.84
     assert max(heights) < 0.96
-    plain = MOTIONS["plain"]
+    plain = moving("plain")
     for time in (0.6, 1.0, 1.49):
         assert_allclose(whole(m, 1.5 * 7 + time)[7:], whole(plain, time)[7:], atol=1e-9)
     steps = [np.linalg.norm(m.velocity(time)[:2]) for time in np.arange(1.4, 2.1, 0.01)]
@@ -240,18 +246,18 @@ def test_low_pass_halves_the_power_at_its_frequency_and_does_not_lag() -> None:
 
 def test_before_the_start_joints_rest_with_and_without_a_blend() -> None:
     for name in ("plain", "looped"):
-        m = MOTIONS[name]
+        m = moving(name)
         assert np.array_equal(m.position(-1.0), m.position(0.0))
         assert not m.velocity(-1.0).any()
 
 
 def test_motion_fits_the_contract_and_survives_pickling() -> None:
-    prescribed: Trajectory = MOTIONS["looped"]
+    prescribed: Trajectory = moving("looped")
     again = pickle.loads(pickle.dumps(prescribed))
     for time in (-1.0, 0.3, 1.6, 9.0):
         assert np.array_equal(prescribed.position(time), again.position(time))
         assert np.array_equal(prescribed.velocity(time), again.velocity(time))
-    some = MOTIONS["some joints"]
+    some = moving("some joints")
     wanted = np.concatenate([MODEL.dofs_of(name) for name in ("head", "knee", "ankle")])
     assert np.array_equal(some.dofs, np.sort(wanted))
     assert some.columns.names == ("head", "knee", "ankle")
