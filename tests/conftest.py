@@ -3,7 +3,8 @@
 import os
 from collections import Counter
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from multiprocessing import get_context
 from pathlib import Path
 
 import pytest
@@ -11,7 +12,7 @@ from hypothesis import settings
 from threadpoolctl import threadpool_limits
 
 from flowborne.kernels import jit
-from flowborne.machine import cores
+from flowborne.machine import cores, end_with_parent
 
 TESTS = Path(__file__).parent
 
@@ -143,3 +144,20 @@ def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
     """Runs of a study are made by threads, which start at once."""
     made = "flowborne.studies.workers.ProcessPoolExecutor"
     monkeypatch.setattr(made, lambda most, **_: ThreadPoolExecutor(most))
+
+
+@pytest.fixture(scope="session")
+def two_processes() -> Iterator[ProcessPoolExecutor]:
+    """What `Processes(2)` starts."""
+    with ProcessPoolExecutor(2, get_context("spawn"), end_with_parent) as pool:
+        yield pool
+
+
+@pytest.fixture
+def shared_processes(monkeypatch: pytest.MonkeyPatch, two_processes: ProcessPoolExecutor) -> None:
+    """`Processes(2)` finds its workers started, and leaves them to the next test: each takes 2 s
+    until it has the kernels of a step. That it starts and stops its own is held by
+    tests/control/test_executors.py and tests/test_drills.py."""
+    pool = "flowborne.control.executors.ProcessPoolExecutor"
+    monkeypatch.setattr(pool, lambda *_: two_processes)
+    monkeypatch.setattr(two_processes, "shutdown", lambda: None)

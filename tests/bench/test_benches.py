@@ -34,6 +34,7 @@ def test_simulations_take_turns_and_the_first_frame_is_not_timed(scene):
     assert np.all(times > 0.0)
 
 
+@pytest.mark.usefixtures("shared_processes")
 def test_workers_are_compared_in_threads_and_in_processes(scene):
     result = speed.compare_workers(scene, frames=2)
     assert [line.split()[:2] for line in result.lines[1:]] == [["two", e] for e in speed.EXECUTORS]
@@ -132,6 +133,7 @@ def test_growth_names_time_and_memory_of_every_size():
     assert "GB/s" in result.lines[-1]
 
 
+@pytest.mark.usefixtures("shared_processes")
 def test_a_human_is_timed_in_every_way():
     result = speed.best_speed(load_scene("human-gravity-back"), frames=1)
     assert judged(result, result.value >= 1.0)

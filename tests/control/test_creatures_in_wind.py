@@ -152,6 +152,7 @@ MAPPERS: dict[str, Callable[[], Mapper]] = {
 }
 
 
+@pytest.mark.usefixtures("shared_processes")
 @pytest.mark.parametrize("name", list(MAPPERS))
 def test_same_bits_whatever_runs_the_trials(name: str) -> None:
     def final(mapper: Mapper) -> dict[str, bytes]:
@@ -163,6 +164,7 @@ def test_same_bits_whatever_runs_the_trials(name: str) -> None:
     assert final(MAPPERS[name]()) == final(Serial())
 
 
+@pytest.mark.usefixtures("shared_processes")
 def test_decision_in_a_fluid_leaves_the_world_alone_and_has_the_same_bits() -> None:
     solid = SolidModel.from_string(
         chain(2), slab=True, gravity=(0.0, -GRAVITY, 0.0), density=DENSITY

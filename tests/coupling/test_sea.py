@@ -182,6 +182,7 @@ SMALL = {"domain.resolution": "16", "dye": "[]", "film.field": "vorticity"} | {
 }
 
 
+@pytest.mark.usefixtures("shared_processes")
 @pytest.mark.parametrize("executor", ["serial", "threads", "processes"])
 def test_trials_workers_and_a_resumed_run_have_the_same_bits(executor: str) -> None:
     """With a wake beyond the exit."""

@@ -109,6 +109,7 @@ def test_a_body_ahead_of_the_domain_is_not_called_lost(folder: Path) -> None:
         assert any(fixed_outside(drift, setup)) == lost
 
 
+@pytest.mark.usefixtures("shared_processes")
 def test_worker_processes_give_the_same_bits_as_the_window_moves() -> None:
     sea = fb.load_scene(
         "eel-sea", {"domain.resolution": "45", "initial.velocities": "{ head_y = 0.5 }"}

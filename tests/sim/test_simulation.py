@@ -21,6 +21,7 @@ def run_frames(scene, frames, **options):
         return state_of(simulation.world), simulation.measure()
 
 
+@pytest.mark.usefixtures("shared_processes")
 def test_numbers_are_the_same_twice_and_with_any_workers_and_executor(small_scene):
     reference, measured = run_frames(small_scene, 6, workers=1)
     for options in ({"workers": 1}, {"workers": 2}, {"executor": "processes", "workers": 2}):
