@@ -148,7 +148,7 @@ def test_a_process_that_dies_costs_its_task_alone_and_what_a_task_raises_is_rais
 
 def test_an_interruption_ends_all_processes_and_their_tasks_clean_up(tmp_path: Path) -> None:
     """As what they have in temporary folders."""
-    gone = tmp_path / "gone"
+    others, gone = set(multiprocessing.active_children()), tmp_path / "gone"
     lasting = (
         f"exec({CLEANS_UP!r}, {{'begun': {str(tmp_path / 'begun')!r}, 'gone': {str(gone)!r}}})"
     )
@@ -156,5 +156,5 @@ def test_an_interruption_ends_all_processes_and_their_tasks_clean_up(tmp_path: P
     answers = side_by_side(eval, (lasting, waits), 2, print)
     assert next(answers) == (waits, True)
     answers.close()  # type: ignore[attr-defined]
-    assert not multiprocessing.active_children()
+    assert set(multiprocessing.active_children()) <= others
     assert gone.exists()
