@@ -15,7 +15,7 @@ import flowborne.studies.error_bars as error_bars
 from flowborne import Refinement
 from flowborne.sim.endings import RunOutcome
 
-from ..made_runs import MASS
+from ..made_runs import spring_scene
 
 
 @pytest.mark.parametrize("order", [0.7, 1.0, 2.0, 3.0])
@@ -151,39 +151,20 @@ def test_a_run_that_ends_early_has_no_error_bar(runs: Runs) -> None:
         fb.error_bar("eel", runs.number, (20, 40))
 
 
-SPRING = """
-dimensions = 3
-
-[time]
-frames_per_second = 10.0
-frames = 5
-
-[solids]
-model = "spring.xml"
-
-[initial]
-positions = { along = 1.0 }
-
-[output]
-checkpoint_every = 5
-"""
-
-
 def test_steps_of_a_scene_show_the_order_of_its_scheme(tmp_path: Path) -> None:
     """A mass on a spring of 2 rad/s, let go, after half a second."""
-    (tmp_path / "spring.xml").write_text(MASS)
-    (tmp_path / "spring.toml").write_text(SPRING)
+    scene = spring_scene(tmp_path)
 
     def final(run: fb.OpenRun) -> float:
         return float(run.history["position_along_m"][-1])
 
-    found = fb.error_bar(tmp_path / "spring.toml", final, steps=(8, 16, 32))
+    found = fb.error_bar(scene, final, steps=(8, 16, 32))
     assert (found.grids, found.shifted) == (None, None)
     assert found.steps is not None
     exact = math.cos(2.0 * 0.5)
     assert abs(found.value - exact) < found.uncertainty < 0.05
     assert found.steps.extrapolated == pytest.approx(exact, abs=1e-3)
     with pytest.raises(ValueError, match="no column 'position_along'"):
-        fb.error_bar(tmp_path / "spring.toml", "position_along", steps=(2, 4), frames=1)
+        fb.error_bar(scene, "position_along", steps=(2, 4), frames=1)
     with pytest.raises(ValueError, match="needs two grids or two steps"):
-        fb.error_bar(tmp_path / "spring.toml", final, steps=(2,))
+        fb.error_bar(scene, final, steps=(2,))
