@@ -87,6 +87,21 @@ def test_a_copy_shares_no_memory_and_steps_alone(simulation: Simulation) -> None
     assert twin.steps == world.steps + 1
 
 
+SEVERAL = ["ns-chain-2", "flyer-base", "eel-free", "eel-sea", "flyer-flesh"]
+
+
+@pytest.mark.parametrize("scene", SEVERAL)
+def test_a_frame_leaves_the_world_before_it(scene: str) -> None:
+    """Steps share with it what they replace: it is what is left when the frame fails. From the
+    third frame on half of the last pressure acts."""
+    with swimming(scene, workers=1) as simulation:
+        for _ in range(4):
+            world, before = simulation.world, bits(simulation.world)
+            simulation.advance_frame()
+            assert bits(world) == before
+            assert bits(simulation.world) != before
+
+
 @pytest.mark.parametrize("scene", ["ns-chain-2", "ns-block-effort"])
 def test_two_runs_are_the_same_bit_for_bit_with_any_number_of_workers(scene: str) -> None:
     found = []

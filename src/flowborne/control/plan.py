@@ -76,7 +76,7 @@ class PlanCourse(Course):
 
     def evaluate(self, objective: ObjectiveSum, displacement: Array) -> float:
         """Mean of the objective over the steps. Raises TrialError when it is not finite."""
-        horizon, world, total = self.horizon, self.world.copy(), 0.0
+        horizon, world, total = self.horizon, self.world.for_step(), 0.0
         world.setup, dt = world.setup.rehearsed, horizon.dt
         for _, pose in self.poses(self.moves + displacement):
             for left in range(horizon.steps, 0, -1):

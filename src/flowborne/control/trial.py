@@ -118,7 +118,7 @@ class PoseCourse(Course):
     def evaluate(self, objective: ObjectiveSum, displacement: Array) -> float:
         """Objective after the hypothetical steps. Raises TrialError when it is not finite."""
         hypothesis, dofs = self.hypothesis, self.dofs
-        world = self.world.copy()
+        world = self.world.for_step()
         world.setup = world.setup.hypothetical
         world.solid.q[:] = self.pose
         command = self._prepare(world, displacement)

@@ -78,7 +78,7 @@ def explicit_half_pressure(world: World, start: Departure, dt: float) -> HalfPre
     square = sum(float((v * k * k)[once].sum()) for once, v, k, _ in fields)
     part = 0.5 * pressure_increment_ratio(both / square) if square > 0.0 else 0.0
     half = part * pressure
-    state.pressure -= half
+    state.pressure = state.pressure - half
     velocity = faces_of([u + part * k for u, k in zip(state.velocity, last, strict=True)])
     start.volumes.follow(velocity, grid)
     pushed = np.full(3, np.nan)

@@ -47,7 +47,7 @@ from flowborne.fluid.control_volumes import NONE
 from flowborne.fluid.ghosts import join_ends, plane, planes
 from flowborne.fluid.grid import Grid
 from flowborne.fluid.projection import PressureGradient
-from flowborne.kernels.arrays import Array, Faces, Integers, Marks
+from flowborne.kernels.arrays import LEAST, Array, Faces, Integers, Marks
 from flowborne.kernels.control_volumes import neighbour
 from flowborne.kernels.dye import face_of
 from flowborne.kernels.faces import mean_flux
@@ -252,9 +252,6 @@ def balanced(
     target[inside] += scaled[number] * np.where(astray[number], volume, give)
     return target
 
-
-LEAST = 1e-3
-"""Part of a face by which a body closes one side of a cell more than the other, if it has one."""
 
 TURNED = -0.5
 """Cosine between the ways into the body at both ends below which it has passed over."""

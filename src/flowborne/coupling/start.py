@@ -69,7 +69,7 @@ def set_going(world: World, given: Mask | None = None) -> None:
     fluid, state = world.flow()
     if fluid.one_way:
         return
-    there = world.copy()
+    there = world.for_step()
     there.setup = world.setup.but(motions=(), winds=(), forces=(), thrusters=())
     command = JointCommand.none(there.solid.v.size)
     kept = np.ones(there.solid.v.size, bool) if given is None else given

@@ -261,7 +261,14 @@ class World:
         self.steps += 1
 
     def copy(self) -> World:
-        fluid = None if self.fluid is None else self.fluid.copy()
+        copy = self.for_step()
+        copy.fluid = None if self.fluid is None else self.fluid.copy()
+        return copy
+
+    def for_step(self) -> World:
+        """A copy to be stepped, which leaves this one as it is; it shares what steps of either
+        replace."""
+        fluid = None if self.fluid is None else self.fluid.for_step()
         memory = {name: values.copy() for name, values in self.memory.items()}
         copy = replace(self, solid=self.solid.copy(), fluid=fluid, memory=memory)
         copy.still = copy.pressed = copy.driven = None

@@ -22,7 +22,7 @@ import numpy as np
 from flowborne.fluid.boundary import Boundaries
 from flowborne.fluid.ghosts import edge, plane, planes
 from flowborne.fluid.grid import Grid, faces_of, inner_product
-from flowborne.kernels.arrays import Array, Faces, Integers
+from flowborne.kernels.arrays import LEAST, Array, Faces, Integers
 from flowborne.kernels.control_volumes import Closed, Transfers, share_velocity
 from flowborne.kernels.face_masses import find_moving
 from flowborne.kernels.faces import weighted_sums
@@ -33,11 +33,7 @@ if TYPE_CHECKING:
 NOTHING = 1e-9
 """Part of a cell below which a control volume holds nothing."""
 
-SLACK = 1e-3
-"""Part of a cell by which the volume of a face that is not cut may differ from a h^3: those of a
-closed region are scaled alike (see `leak_proof`)."""
-
-WHOLE = 1.0 - SLACK
+WHOLE = 1.0 - LEAST
 """Part of a cell from which on control volumes count as uncut."""
 
 NONE = np.zeros(0, np.int64)
@@ -90,7 +86,7 @@ def moving_volumes(
     """What moves with the faces across an axis, and what `ControlVolumes` has of them."""
     faces, found = boundaries.faces(component, grid), np.empty(grid.face_shape(component))
     ends, cell = boundaries.normal()[component], grid.cell_volume
-    limits = cell, WHOLE, SLACK * cell, NOTHING * cell
+    limits = cell, WHOLE, LEAST * cell, NOTHING * cell
     fields = plane(found, grid), plane(cells, grid), planes(opened, grid)
     cut, closed, given = find_moving(*fields, faces, ends, limits)
     if boundaries.periodic()[component]:

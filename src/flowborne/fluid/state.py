@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,8 @@ WHOLE = "pressure", "previous_pressure", "cell_volume", "pose", "wake", "sea"
 class FluidState:
     """The fluid at t^n, and what the next step needs of the last one, from t^{n-1} to t^n.
 
-    A step replaces the arrays of velocity and pressure: one kept over it has the old values.
+    A step writes over the arrays of velocity and acceleration, and replaces all others: one of
+    these that is kept over it has the old values.
 
     velocity           u^n on the faces, m/s; 0 where a face is wholly closed
     velocity_change    u^n - u^{n-1} on the faces, m/s; 0 before the first step, and next to bodies
@@ -62,6 +63,13 @@ class FluidState:
 
     def copy(self) -> FluidState:
         return FluidState.from_arrays({k: v.copy() for k, v in self.arrays().items()})
+
+    def for_step(self) -> FluidState:
+        """A copy of its own of what a step writes over, with the arrays of the rest."""
+        velocity, acceleration = (
+            faces_of([u.copy() for u in faces]) for faces in (self.velocity, self.acceleration)
+        )
+        return replace(self, velocity=velocity, acceleration=acceleration)
 
     def arrays(self) -> dict[str, Array]:
         """Every array by a name; `from_arrays` is the way back."""

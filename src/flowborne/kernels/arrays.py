@@ -10,6 +10,12 @@ from numpy.typing import NDArray
 ROUNDING = 1e-15
 """Relative size of what is a rounding error of numbers in double precision."""
 
+LEAST = 1e-3
+"""Part of a cell, of a face or of the distance between two that makes no difference near bodies. A
+cell without as much is whole, as closed regions are scaled (see `coupling.leak_proof`); two sides
+of it are as closed as each other; and friction does not grow where distances and volumes are
+smaller."""
+
 PRESCRIBED, PERIODIC, FREE = -1, 0, 1
 """a in u_ghost = a u_inside + b beyond a side: it gives the component of velocity on it, is the
 opposite side, or leaves the component to the flow; see `fluid.sides.side`."""

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flowborne.kernels.arrays import Array, Integers
+from flowborne.kernels.arrays import LEAST, Array, Integers
 from flowborne.kernels.cut_faces import (
     closed_face,
     crossings_on,
@@ -27,7 +27,7 @@ from flowborne.kernels.cut_faces import (
 )
 from flowborne.kernels.edge_crossings import Crossings
 from flowborne.kernels.jit import inlined, kernel
-from flowborne.kernels.viscosity import LEAST, UNKNOWN, CutFaces, nearest_node
+from flowborne.kernels.viscosity import UNKNOWN, CutFaces, nearest_node
 
 SHARP = np.cos(np.radians(20.0))
 """Cosine of the least turn of a wall at a corner: round bodies are polygons that turn by less."""

@@ -35,9 +35,9 @@ def differ(a: float, b: float, rounding: float) -> bool:
 @inlined
 def differs(w: Real, i: int, j: int, first: int, common: float, rounding: float) -> bool:
     """Whether some weight of row (i, j) from `first` on is another one than the common one."""
-    found = 0
-    for k in range(first, w.shape[2] - 1):
-        found += int(abs(w[i, j, k] - common) > rounding * common)
+    found, row = 0, w[i, j, first:-1]
+    for k in range(row.size):
+        found += int(abs(row[k] - common) > rounding * common)
     return found > 0
 
 

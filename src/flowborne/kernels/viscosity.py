@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import prange
 
-from flowborne.kernels.arrays import PERIODIC, Array, Integers, Marks
+from flowborne.kernels.arrays import LEAST, PERIODIC, Array, Integers, Marks
 from flowborne.kernels.control_volumes import indices
 from flowborne.kernels.cut_faces import SAME, closed_face, open_edge, other_axes
 from flowborne.kernels.edge_crossings import Crossings
@@ -20,10 +20,6 @@ from flowborne.kernels.jit import inlined, kernel
 
 INACTIVE, UNKNOWN, GIVEN = range(3)
 """A face is inside a body, solved for, or prescribed by a side."""
-
-LEAST = 1e-3
-"""Least distance from a wall and between two faces, and least open part of a cell over that of its
-faces: bounds friction where they are smaller."""
 
 Index = tuple[int, int, int]
 

@@ -232,7 +232,7 @@ class Simulation:
 
     def _next_frame(self, commands: Commands | None) -> FrameReport:
         self._apply_changes()
-        world = self.world.copy()
+        world = self.world.for_step()
         splits = self.report is not None and self.report.step.added_mass.done
         if splits != world.setup.splits:  # asked for once, asked for again
             world.setup = world.setup.but(splits=splits)

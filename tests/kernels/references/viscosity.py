@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from flowborne.kernels.arrays import PERIODIC, Array, Integers, Pixels
+from flowborne.kernels.arrays import LEAST, PERIODIC, Array, Integers, Pixels
 from flowborne.kernels.cut_faces import SAME
-from flowborne.kernels.viscosity import GIVEN, LEAST, UNKNOWN
+from flowborne.kernels.viscosity import GIVEN, UNKNOWN
 
 from .cut_faces import closed_polygon_reference, open_edge_reference
 
