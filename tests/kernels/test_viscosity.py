@@ -58,8 +58,9 @@ def kinds(shape: tuple[int, int, int], normal: np.ndarray, axis: int) -> tuple:
 def test_distances_and_kinds(shape: tuple, normal: np.ndarray, axis: int) -> None:
     made = cut(shape)
     phi = np.empty(face_shape(shape, axis))
-    face_distances(made.distance, axis, phi)
-    np.testing.assert_allclose(phi, face_distances_reference(made.distance, axis), atol=1e-15)
+    face_distances(made.distance, axis, 0.5, phi)
+    expected = face_distances_reference(made.distance, axis) - 0.5
+    np.testing.assert_allclose(phi, expected, atol=1e-15)
     opened = np.moveaxis(made.opened[axis], axis, 0)
     kind = np.moveaxis(kinds_of_faces(made.opened[axis], axis, normal), axis, 0)
     given = {PRESCRIBED: GIVEN, FREE: UNKNOWN, PERIODIC: UNKNOWN}

@@ -227,10 +227,10 @@ class ViscousSystem:
     ) -> None:
         self.systems, self.walls, self.size, self.grid, self.dt = systems, walls, size, grid, dt
         self.wraps = np.array(grid.shape) * np.array(boundaries.periodic())
-        self.diagonal = np.concatenate([system.diagonal.ravel() for system in systems])
-        unknown = self.diagonal > 0.0
-        self.root = np.sqrt(self.diagonal)
-        self.scale = np.divide(1.0, self.root, out=np.zeros(self.root.size), where=unknown)
+        self.mass, self.diagonal, self.given = systems[0].all
+        self.root, self.held = np.sqrt(self.diagonal), self.diagonal == 0.0
+        self.scale = np.divide(1.0, self.root, out=np.zeros(self.root.size), where=~self.held)
+        self.product = spread(self.root.size)
         self.most = MOST * max(MOST, *grid.shape)
         self.couples = walls.couples(bodies)
         self.answer_by(answering)
@@ -263,8 +263,8 @@ class ViscousSystem:
 
     def apply(self, x: Array) -> Array:
         """The matrix with the bodies eliminated, scaled to a diagonal of 1, times x (see
-        `spread`)."""
-        out = np.zeros_like(x)
+        `spread`); until it is applied again."""
+        out = self.product
         product, given = out.reshape(-1), x.reshape(-1)
         for system in self.systems:
             part = system.part
@@ -298,32 +298,33 @@ class ViscousSystem:
                    face's axis, m/s; none unless given
         returns    Faces; (k,) impulse, N s and N m s; whether the residual was reached
         """
-        start = np.concatenate([velocity[axis].ravel() for axis in self.grid.axes])
-        mass = np.concatenate([system.mass.ravel() for system in self.systems])
-        walls = self.walls
+        walls, held = self.walls, self.held
         blown = np.zeros(walls.index.size) if slip is None else slip
-        given = np.concatenate([system.given.ravel() for system in self.systems])
-        unknown = self.diagonal > 0.0
-        rhs = np.where(unknown, mass * start + given, 0.0)
-        known = self.answer.to(self.push(np.where(unknown, 0.0, start), twist, blown))[0]
+        start = np.concatenate([velocity[axis].ravel() for axis in self.grid.axes])
+        right, y = spread(start.size), spread(start.size)
+        rhs, scaled = (rows.reshape(-1)[: start.size] for rows in (right, y))
+        np.multiply(self.mass, start, out=rhs)
+        rhs += self.given
+        fixed = np.where(held[walls.index], start[walls.index], 0.0)
+        known = self.answer.to(self.push(fixed, twist, blown))[0]
         np.add.at(rhs, walls.index, walls.weight @ (self.at_walls(twist + known) + blown))
-        right = spread(self.scale * rhs)
-        guess = start if self.last is None else self.last
-        y = spread(np.where(unknown, guess, 0.0) * self.root)
+        rhs *= self.scale
+        np.multiply(start if self.last is None else self.last, self.root, out=scaled)
         guide = self.precondition if self.cycles else None
         converged = conjugate_gradients(self.apply, right, y, tolerance, self.most, guide)
-        result = np.where(unknown, self.scale * y.reshape(-1)[: start.size], start)
+        result = self.scale * scaled
+        np.copyto(result, start, where=held)
         self.last = result if self.cycles else None
-        impulse = self.answer.to(self.push(result, twist, blown))[1]
+        impulse = self.answer.to(self.push(result[walls.index], twist, blown))[1]
         return self._split(result, velocity), impulse, converged
 
     def push(self, velocity: Array, twist: Array, slip: Array) -> Array:
         """(k,) impulse on bodies that keep their motion, dt (B^T W (u - slip - B s) - C s).
 
-        velocity  over the concatenated faces, m/s;  twist  (k,) s;  slip  (n,) as in `solve`
+        velocity  (n,) m/s at the walls;  twist  (k,) s;  slip  (n,) as in `solve`
         """
         walls, bodies = self.walls, len(self.couples)
-        force = walls.weight @ (velocity[walls.index] - self.at_walls(twist) - slip)
+        force = walls.weight @ (velocity - self.at_walls(twist) - slip)
         each = (force[:, None] * walls.arm).ravel()
         push = np.asarray(np.bincount(walls.columns.ravel(), each, twist.size), float)
         spin = twist[: 6 * bodies].reshape(bodies, 6)[:, 3:]
@@ -332,7 +333,7 @@ class ViscousSystem:
 
     def _split(self, values: Array, like: Faces) -> Faces:
         """Concatenated components as faces; periodic ends joined; a slab's z as it was."""
-        parts = [like[0], like[1], like[2].copy()]
+        parts = list(like)
         for axis, system in zip(self.grid.axes, self.systems, strict=True):
             parts[axis] = values[system.part].reshape(system.kind.shape)
             if self.wraps[axis]:
@@ -377,8 +378,9 @@ class Viscosity:
         if not driven.same_mobility(self.driven):
             self.system.answer_by(partial(driven.answering, pose))
         self.driven = driven
-        pushed = faces_of([u.copy() for u in self.velocity])
-        gradient.subtract(pushed, pressure, dt)
+        fields = zip(range(3), self.velocity, strict=True)
+        pushed = faces_of([np.empty_like(u) if a in gradient.grid.axes else u for a, u in fields])
+        gradient.subtract(self.velocity, pressure, dt, pushed)
         earlier = pressure_push(cut, dt * pressure, size)
         moving = boundary_velocity(pose, driven.after(generalised(pose, earlier)))
         smooth, impulse, converged = self.system.solve(pushed, moving, TOLERANCE, self.slip)

@@ -28,6 +28,7 @@ Method: docs/method/viscosity.md.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import prod
 from typing import NamedTuple
 
 import numpy as np
@@ -74,10 +75,8 @@ class ViscousFaces:
 
     first     position of the component among the concatenated faces
     kind      INACTIVE, UNKNOWN or GIVEN
-    mass      m / dt, kg/s; see SIDE_MASS
-    diagonal  m / dt + sum of links + W of unknowns, else 0, kg/s
+    all       (3, n) mass, diagonal and given of all components, over the concatenated faces
     links     (3, ...) k to the next face along each axis, between unknowns, kg/s
-    given     force of neighbours and sides with prescribed velocity, N
     centre    (2, ...) of each face's open part from that of the whole along the two other axes, m
     beside    (n,) flat indices of the unknowns beside a body, once for each piece of wall
     wall      (n,) W, kg/s
@@ -89,10 +88,8 @@ class ViscousFaces:
 
     first: int
     kind: Marks
-    mass: Array
-    diagonal: Array
+    all: Array
     links: Array
-    given: Array
     centre: Array
     beside: Integers
     wall: Array
@@ -105,6 +102,16 @@ class ViscousFaces:
     def part(self) -> slice:
         """Where the component is among the concatenated faces."""
         return slice(self.first, self.first + self.kind.size)
+
+    @property
+    def mass(self) -> Array:
+        """m / dt, kg/s; see SIDE_MASS."""
+        return self.all[0, self.part].reshape(self.kind.shape)
+
+    @property
+    def diagonal(self) -> Array:
+        """m / dt + sum of links + W of unknowns, else 0, kg/s."""
+        return self.all[1, self.part].reshape(self.kind.shape)
 
 
 @dataclass(frozen=True)
@@ -143,21 +150,22 @@ def assemble_viscosity(
     stiffness = viscosity * grid.face_area / h
     edges, parts = (cut.distance, cut.crossings), cut.cells / grid.cell_volume
     systems: list[ViscousFaces] = []
+    whole = np.zeros((3, sum(prod(grid.face_shape(axis)) for axis in grid.axes)))
     wraps = np.array(grid.shape) * np.array(periodic)
     found = find_corners(*edges, h)
     for axis in grid.axes:
         shape, opened = grid.face_shape(axis), cut.faces[axis]
         kind, away = kinds_of_faces(opened, axis, normal), np.empty(shape)
-        face_distances(cut.distance, axis, away)
-        away -= NEAR * h
+        face_distances(cut.distance, axis, NEAR * h, away)
         near = np.flatnonzero((kind != INACTIVE) & (away <= 0.0))
         centre = np.zeros((2, *shape))
         find_centres(*edges, axis, near, centre, grid.is_slab)
-        mass = masses[axis] / dt
-        friction, given = stick_to_sides(kind, stiffness, grid, boundaries, axis, time)
-        mass[(friction > 0.0) & (kind == UNKNOWN)] *= SIDE_MASS
-        diagonal = np.where(kind == UNKNOWN, mass + friction, 0.0)
-        links = np.zeros((3, *shape))
+        first, links = systems[-1].part.stop if systems else 0, np.zeros((3, *shape))
+        mass, diagonal, given = whole[:, first : first + kind.size].reshape(links.shape)
+        np.divide(masses[axis], dt, out=mass)
+        stick_to_sides(diagonal, given, kind, stiffness, grid, boundaries, axis, time)
+        mass[diagonal > 0.0] *= SIDE_MASS
+        np.add(mass, diagonal, out=diagonal, where=kind == UNKNOWN)
         faces = CutFaces(axis, kind, *edges, opened, centre, parts, stiffness)
         for d in grid.axes:
             around = away, velocity[axis], diagonal, links[d], given
@@ -171,8 +179,7 @@ def assemble_viscosity(
         met = wall != 0.0
         beside = np.repeat(beside, met.sum(axis=1))
         pieces = beside, wall[met], h * gap[met], h * place[met], node[met]
-        first = systems[-1].part.stop if systems else 0
-        system = first, kind, mass, diagonal, links, given, h * centre, *pieces, corners
+        system = first, kind, whole, links, h * centre, *pieces, corners
         systems.append(ViscousFaces(*system))
     return systems
 
@@ -193,15 +200,20 @@ def kinds_of_faces(opened: Array, axis: int, normal: Integers) -> Marks:
 
 
 def stick_to_sides(
-    kind: Marks, stiffness: float, grid: Grid, boundaries: Boundaries, axis: int, time: float
-) -> tuple[Array, Array]:
-    """Friction of the domain's sides on the faces across `axis`, kg/s, and the force of moving
-    ones, N."""
-    friction, given = np.zeros(kind.shape), np.zeros(kind.shape)
+    friction: Array,
+    given: Array,
+    kind: Marks,
+    stiffness: float,
+    grid: Grid,
+    boundaries: Boundaries,
+    axis: int,
+    time: float,
+) -> None:
+    """Add the friction of the domain's sides on the faces across `axis`, kg/s, and the force of
+    moving ones, N, in place."""
     for place, side in boundaries.around(grid):
         if place.axis != axis and side.tangential == PRESCRIBED:
             wall = side.prescribed_velocity(place, axis, time)
             coefficient = 2.0 * stiffness * (kind[place.layer] == UNKNOWN)
             friction[place.layer] += coefficient
             given[place.layer] += coefficient * wall
-    return friction, given

@@ -48,19 +48,18 @@ class CutFaces(NamedTuple):
 
 
 @kernel
-def face_distances(distance: Array, axis: int, out: Array) -> None:
-    """Distance to the nearest body at the centres of the faces across `axis`: mean of corners."""
+def face_distances(distance: Array, axis: int, near: float, out: Array) -> None:
+    """Distance to the nearest body at the centres of the faces across `axis`, the mean of corners,
+    less `near`."""
     ai, aj = int(axis != 0), int(axis == 0)
     bj, bk = int(axis == 2), int(axis != 2)
     for i in prange(out.shape[0]):
         for j in range(out.shape[1]):
             for k in range(out.shape[2]):
-                out[i, j, k] = 0.25 * (
-                    distance[i, j, k]
-                    + distance[i + ai, j + aj, k]
-                    + distance[i, j + bj, k + bk]
-                    + distance[i + ai, j + aj + bj, k + bk]
-                )
+                total = distance[i, j, k] + distance[i + ai, j + aj, k]
+                total = total + distance[i, j + bj, k + bk]
+                total = total + distance[i + ai, j + aj + bj, k + bk]
+                out[i, j, k] = 0.25 * total - near
 
 
 @kernel
@@ -243,28 +242,54 @@ def meet_walls(
     return wall, gap, place, node
 
 
+@inlined
+def beside(at: int, count: int, ring: int) -> tuple[int, int]:
+    """The layers above and below one along an axis of `count`, of which `ring` are distinct where
+    it is periodic, else 0; -1 where there is none."""
+    above = 0 if at + 1 == ring else at + 1
+    below = ring - 1 if at == 0 else at - 1
+    return (above if above < count else -1), (below if at != ring else -1)
+
+
+@inlined
+def add_linked(total: Array, link: Array, scale: Array, x: Array) -> None:
+    """Add link x scale x of the neighbours of a row, in place."""
+    for k in range(total.size):
+        total[k] += link[k] * scale[k] * x[k]
+
+
 @kernel
 def apply_component(out: Array, x: Array, scale: Array, links: Array, wraps: Integers) -> None:
     """out = x - scale sum of links (scale x) of the neighbours, for one component.
 
     wraps  (3,) number of distinct faces along each axis where the domain is periodic, else 0
     """
-    _, ni, nj, nk = links.shape
-    steps = nj * nk, nk, 1
-    link = links.reshape(3, -1)
-    for plane in prange(ni):
-        i = np.int64(plane)
-        for j in range(nj):
-            for k in range(nk):
-                f = i * steps[0] + j * steps[1] + k
-                total = 0.0
-                for d in range(3):
-                    at = i if d == 0 else (j if d == 1 else k)
-                    around = steps[d] * (wraps[d] - 1)
-                    if link[d, f] != 0.0:
-                        g = f - around if at + 1 == wraps[d] else f + steps[d]
-                        total += link[d, f] * scale[g] * x[g]
-                    if at != wraps[d]:
-                        g = f - steps[d] if at > 0 else f + around
-                        total += link[d, g] * scale[g] * x[g]
-                out[f] = x[f] - scale[f] * total
+    u, v, w, a, b, c = links[0], links[1], links[2], wraps[0], wraps[1], wraps[2]
+    if u.shape[2] == 1:  # a slab's rows along y
+        shape = 1, u.shape[0], u.shape[1]
+        u, v, w, a, b, c = w.reshape(shape), u.reshape(shape), v.reshape(shape), c, a, b
+    ni, nj, nk = u.shape
+    field, root, product = x.reshape(u.shape), scale.reshape(u.shape), out.reshape(u.shape)
+    for row in prange(ni * nj):
+        i, j = np.int64(row) // nj, np.int64(row) % nj
+        total, own, size, link = product[i, j], field[i, j], root[i, j], w[i, j]
+        total[:] = 0.0
+        above, below = beside(i, ni, a)
+        if above >= 0:
+            add_linked(total, u[i, j], root[above, j], field[above, j])
+        if below >= 0:
+            add_linked(total, u[below, j], root[below, j], field[below, j])
+        above, below = beside(j, nj, b)
+        if above >= 0:
+            add_linked(total, v[i, j], root[i, above], field[i, above])
+        if below >= 0:
+            add_linked(total, v[i, below], root[i, below], field[i, below])
+        end = (c if c > 0 else nk) - 1
+        add_linked(total[:end], link[:end], size[1 : end + 1], own[1 : end + 1])
+        if c > 0:
+            total[end] += link[end] * size[0] * own[0]
+        add_linked(total[1 : end + 1], link[:end], size[:end], own[:end])
+        if c > 0:
+            total[0] += link[end] * size[end] * own[end]
+        for k in range(nk):
+            total[k] = own[k] - size[k] * total[k]

@@ -16,11 +16,10 @@ WIDTH = 256
 """Entries in a row of the vectors."""
 
 
-def spread(values: Array) -> Array:
-    """A flat vector in rows of WIDTH, filled up with zeros: what threads share out."""
-    rows = np.zeros((-(-values.size // WIDTH), 1, WIDTH))
-    rows.reshape(-1)[: values.size] = values
-    return rows
+def spread(size: int) -> Array:
+    """Zeros for a flat vector of a size in rows of WIDTH, and what fills up the last one: what
+    threads share out."""
+    return np.zeros((-(-size // WIDTH), 1, WIDTH))
 
 
 def conjugate_gradients(
