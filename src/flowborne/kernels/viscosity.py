@@ -13,13 +13,16 @@ import numpy as np
 from numba import prange
 
 from flowborne.kernels.arrays import LEAST, PERIODIC, Array, Integers, Marks
-from flowborne.kernels.control_volumes import indices
+from flowborne.kernels.control_volumes import indices, stride
 from flowborne.kernels.cut_faces import SAME, closed_face, open_edge, other_axes
 from flowborne.kernels.edge_crossings import Crossings
 from flowborne.kernels.jit import inlined, kernel
 
 INACTIVE, UNKNOWN, GIVEN = range(3)
 """A face is inside a body, solved for, or prescribed by a side."""
+
+RUN = 64
+"""Faces that are linked together."""
 
 Index = tuple[int, int, int]
 
@@ -127,15 +130,20 @@ def link_faces(
     periodic  whether the domain is along d
     """
     axis, kind, distance, crossings, opened, centre, parts, stiffness = faces
-    count = kind.shape[d] - int(periodic and d == axis)
-    m = int(d == other_axes(axis)[1])
-    for i in range(kind.shape[0]):
-        for j in range(kind.shape[1]):
-            for k in range(kind.shape[2]):
-                f = i, j, k
-                g = face_along(f, d, 1, count, periodic)
-                if f[d] >= count or g[d] < 0:
-                    continue
+    shape, step, m = kind.shape, stride(kind.shape, d), int(d == other_axes(axis)[1])
+    count = shape[d] - int(periodic and d == axis)
+    kinds, far = kind.reshape(-1), away.reshape(-1)
+    whole, links = diagonal.reshape(-1), link.reshape(-1)
+    for first in range(0, kind.size, shape[d] * step):
+        start, end = first, first + (count - 1) * step
+        while start < end + step * int(periodic):
+            wraps = start >= end
+            stop = min(start + RUN, end + step * int(wraps))
+            onward = start + step - count * step * int(wraps)
+            alike = link_alike(start, stop, onward, kinds, far, whole, links, stiffness)
+            for at in range(stop if alike else start, stop):
+                i, j, k = f = indices(shape, at)
+                g = indices(shape, onward + at - start)
                 here, there = kind[f] == UNKNOWN, kind[g] == UNKNOWN
                 known = kind[f] == GIVEN or kind[g] == GIVEN
                 if not ((here and there) or (known and (here or there))):
@@ -159,6 +167,32 @@ def link_faces(
                     given[f] += coefficient * velocity[g]
                 else:
                     given[g] += coefficient * velocity[f]
+            start = stop
+
+
+@inlined
+def link_alike(
+    start: int, stop: int, onward: int, kinds: Marks, far: Array, diagonal: Array, links: Array,
+    stiffness: float,
+) -> bool:  # fmt: skip
+    """`link_faces` on a run of faces and as many from `onward` on, all arrays flat; False and
+    nothing where a body is near or a velocity is given. Places are unsigned: vector code."""
+    a, b, size = np.uintp(start), np.uintp(onward), np.uintp(stop - start)
+    given, near = np.uint8(0), 0
+    for k in range(size):
+        given |= np.uint8(kinds[a + k] == GIVEN) | np.uint8(kinds[b + k] == GIVEN)
+    for k in range(size):
+        near += far[a + k] <= 0.0
+    if given or near:
+        return False
+    for k in range(size):
+        both = (kinds[a + k] == UNKNOWN) & (kinds[b + k] == UNKNOWN)
+        links[a + k] = stiffness if both else 0.0
+    for k in range(size):
+        diagonal[a + k] += links[a + k]
+    for k in range(size):
+        diagonal[b + k] += links[a + k]
+    return True
 
 
 @kernel
