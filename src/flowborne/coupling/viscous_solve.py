@@ -44,6 +44,7 @@ from flowborne.kernels.sparse_rows import add_rows, sum_rows
 from flowborne.kernels.viscosity import apply_component
 from flowborne.solids.driven import Driven
 from flowborne.solids.dynamics import Kinematics
+from flowborne.solids.scratch import cross
 from flowborne.solvers.conjugate_gradients import conjugate_gradients, spread
 from flowborne.solvers.mobility import Answering, Drag
 from flowborne.solvers.v_cycle import VCycle
@@ -86,15 +87,15 @@ class Walls:
         at the wall point, is larger by this; about any point for a closed surface, else about
         the middle of its wall points. Symmetric but for the coarseness of the cells, and made so.
         """
-        couples, weight = np.zeros((bodies, 3, 3)), self.weight.diagonal()
-        for body in np.unique(self.body[self.body < bodies]):
-            own = self.body == body
-            point, across, gap = self.point[own], self.across[own], self.gap[own]
-            lever = np.cross(point - point.mean(axis=0), across)
-            couple = (weight[own, None] * lever).T @ np.cross(gap, across)
-            share, axes = np.linalg.eigh(0.5 * (couple + couple.T))
-            couples[body] = (axes * np.maximum(share, 0.0)) @ axes.T
-        return couples
+        own = self.body < bodies
+        body, point, across = self.body[own], self.point[own], self.across[own]
+        weight, spin = self.weight.diagonal()[own, None], cross(self.gap[own], across)
+        count = np.maximum(np.bincount(body, minlength=bodies), 1)[:, None]
+        lever = cross(point - (summed(point, body, bodies) / count)[body], across)
+        products = (weight * lever)[:, :, None] * spin[:, None]
+        couple = summed(products.reshape(-1, 9), body, bodies).reshape(-1, 3, 3)
+        share, axes = np.linalg.eigh(0.5 * (couple + couple.swapaxes(1, 2)))
+        return np.asarray((axes * np.maximum(share, 0.0)[:, None]) @ axes.swapaxes(1, 2))
 
     def drag(self, couples: Array, size: int) -> Drag:
         """(k, k) B^T W B + C; dense where there are bodies alone.
@@ -111,12 +112,16 @@ class Walls:
             rest = csr_array((size - 6 * bodies, size - 6 * bodies))
             couple = block_diag([*blocks, rest], format="csr")
             return csr_array(arms.T @ (self.weight @ arms) + couple)
-        drag = np.zeros((bodies, 6, bodies, 6))
+        drag, pull = np.zeros((bodies, 6, bodies, 6)), self.weight @ self.arm
         for body in range(bodies):
             own = self.body == body
-            arm = self.arm[own]
-            drag[body, :, body] = blocks[body] + (self.weight @ self.arm)[own].T @ arm
+            drag[body, :, body] = blocks[body] + pull[own].T @ self.arm[own]
         return drag.reshape(size, size)
+
+
+def summed(values: Array, body: Integers, bodies: int) -> Array:
+    """(bodies, m) sums of values (n, m) by their bodies (n,)."""
+    return np.stack([np.bincount(body, column, bodies) for column in values.T], axis=1)
 
 
 def walls_of(systems: list[ViscousFaces], cut: Geometry, grid: Grid) -> Walls:
@@ -124,14 +129,13 @@ def walls_of(systems: list[ViscousFaces], cut: Geometry, grid: Grid) -> Walls:
     own = zip(grid.axes, systems, strict=True)
     parts = [walls_across(axis, system, cut, grid) for axis, system in own]
     names = [field.name for field in fields(Walls) if field.name != "weight"]
-    joined = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
-    weight = block_diag([part.weight for part in parts], format="csr")
-    return Walls(**joined, weight=csr_array(weight))
+    joined = {name: np.concatenate([part[name] for part in parts]) for name in names}
+    return Walls(**joined, weight=weights(systems))
 
 
-def walls_across(axis: int, system: ViscousFaces, cut: Geometry, grid: Grid) -> Walls:
-    """The pieces of wall of the faces across `axis`, and those around corners; each belongs to the
-    body nearest to one of its nodes."""
+def walls_across(axis: int, system: ViscousFaces, cut: Geometry, grid: Grid) -> dict[str, Array]:
+    """The pieces of wall of the faces across `axis`, and those around corners, as in `Walls` but
+    for the weights; each belongs to the body nearest to one of its nodes."""
     around, _, corner_node = system.corners
     index = np.concatenate([system.beside, around.ravel()])
     at = np.stack(np.unravel_index(index, system.kind.shape), axis=1)
@@ -147,26 +151,30 @@ def walls_across(axis: int, system: ViscousFaces, cut: Geometry, grid: Grid) -> 
     body = cut.nearest.reshape(-1)[nodes]
     point = cut.images.at_bodies(point, body)
     across = np.tile(np.eye(3)[axis], (index.size, 1))
-    return Walls(
-        index=system.first + index,
-        weight=weights(system),
-        body=body,
-        columns=6 * body[:, None] + np.arange(6),
-        arm=np.concatenate([across, np.cross(point, across)], axis=1),
-        across=across,
-        point=point,
-        gap=np.concatenate([system.gap, np.zeros((index.size - met, 3))]),
-    )
+    return {
+        "index": system.first + index,
+        "body": body,
+        "columns": 6 * body[:, None] + np.arange(6),
+        "arm": np.concatenate([across, cross(point, across)], axis=1),
+        "across": across,
+        "point": point,
+        "gap": np.concatenate([system.gap, np.zeros((index.size - met, 3))]),
+    }
 
 
-def weights(system: ViscousFaces) -> csr_array:
-    """(n, n) W of a component: walls and corners."""
-    values = np.concatenate([system.wall, system.corners.matrix.ravel()])
-    first, around = system.wall.size, system.corners.faces.size
-    columns = np.repeat(np.arange(first, first + around).reshape(-1, 1, AROUND), AROUND, axis=1)
-    places = np.concatenate([np.arange(first), columns.ravel()])
-    starts = np.append(0, np.cumsum(np.repeat([1, AROUND], [first, around])))
-    return csr_array((values, places, starts), (first + around, first + around))
+def weights(systems: list[ViscousFaces]) -> csr_array:
+    """(n, n) W: walls and corners of every component."""
+    values, columns, entries, size = [], [], [], 0
+    for system in systems:
+        walls, around = system.wall.size, system.corners.faces.size
+        faces = np.arange(size, size + walls + around)
+        corners = np.repeat(faces[walls:].reshape(-1, 1, AROUND), AROUND, axis=1)
+        values += [system.wall, system.corners.matrix.ravel()]
+        columns += [faces[:walls], corners.ravel()]
+        entries.append(np.repeat([1, AROUND], [walls, around]))
+        size += faces.size
+    starts = np.append(0, np.cumsum(np.concatenate(entries)))
+    return csr_array((np.concatenate(values), np.concatenate(columns), starts), (size, size))
 
 
 def cycle_on(system: ViscousFaces, wraps: Integers) -> VCycle:
