@@ -22,7 +22,7 @@ INACTIVE, UNKNOWN, GIVEN = range(3)
 """A face is inside a body, solved for, or prescribed by a side."""
 
 RUN = 64
-"""Faces that are linked together."""
+"""Most faces that are linked together."""
 
 Index = tuple[int, int, int]
 
@@ -129,34 +129,41 @@ def link_faces(
     away      distance to bodies at each face; above 0 where it and its neighbours are uncut
     periodic  whether the domain is along d
     """
-    axis, kind, distance, crossings, opened, centre, parts, stiffness = faces
+    axis, kind, distance, (at, part, bend, piece), opened, centre, parts, stiffness = faces
     shape, step, m = kind.shape, stride(kind.shape, d), int(d == other_axes(axis)[1])
     count = shape[d] - int(periodic and d == axis)
     kinds, far = kind.reshape(-1), away.reshape(-1)
     whole, links = diagonal.reshape(-1), link.reshape(-1)
-    for first in range(0, kind.size, shape[d] * step):
-        start, end = first, first + (count - 1) * step
-        while start < end + step * int(periodic):
-            wraps = start >= end
-            stop = min(start + RUN, end + step * int(wraps))
+    # columns along d of RUN faces side by side, or of one whose runs go along it
+    wide, hop = (1, RUN) if step == 1 else ((step + RUN - 1) // RUN, step)
+    hops = (count + RUN - 2) // RUN if step == 1 else count - 1
+    for column in prange(kind.size // (shape[d] * step) * wide):
+        row, place = np.int64(column) // wide, np.int64(column) % wide
+        first = row * shape[d] * step + place * RUN
+        crossings = Crossings(at, part, bend, piece)  # loops on threads take no tuple in a tuple
+        for n in range(hops + int(periodic)):
+            wraps = n == hops
+            start = first + ((count - 1) * step if wraps else n * hop)
             onward = start + step - count * step * int(wraps)
+            size = step - place * RUN if step > 1 or wraps else count - 1 - n * RUN
+            stop = start + min(RUN, size)
             alike = link_alike(start, stop, onward, kinds, far, whole, links, stiffness)
-            for at in range(stop if alike else start, stop):
-                i, j, k = f = indices(shape, at)
-                g = indices(shape, onward + at - start)
+            for other in range(stop if alike else start, stop):
+                f, g = indices(shape, other), indices(shape, onward + other - start)
+                i, j, k = f
                 here, there = kind[f] == UNKNOWN, kind[g] == UNKNOWN
                 known = kind[f] == GIVEN or kind[g] == GIVEN
                 if not ((here and there) or (known and (here or there))):
                     continue
                 coefficient = stiffness
                 if away[f] <= 0.0 and d == axis:
-                    part = max(parts[f], LEAST * max(opened[f], opened[g]))
-                    coefficient *= opened[f] * opened[g] / part
+                    room = max(parts[f], LEAST * max(opened[f], opened[g]))
+                    coefficient *= opened[f] * opened[g] / room
                 elif away[f] <= 0.0:
                     above = i + int(d == 0), j + int(d == 1), k + int(d == 2)
-                    part = open_edge(distance, crossings, 3 - axis - d, *above)
+                    width = open_edge(distance, crossings, 3 - axis - d, *above)
                     apart = 1.0 + centre[m, g[0], g[1], g[2]] - centre[m, i, j, k]
-                    coefficient *= part / max(apart, LEAST)
+                    coefficient *= width / max(apart, LEAST)
                 if here:
                     diagonal[f] += coefficient
                 if there:
@@ -167,7 +174,6 @@ def link_faces(
                     given[f] += coefficient * velocity[g]
                 else:
                     given[g] += coefficient * velocity[f]
-            start = stop
 
 
 @inlined
