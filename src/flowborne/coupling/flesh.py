@@ -18,7 +18,7 @@ from flowborne.fluid.grid import Grid, faces_of
 from flowborne.kernels.arrays import Array, Integers
 from flowborne.kernels.closed_fractions import Piece
 from flowborne.kernels.edge_crossings import PIECES, Crossings, new_crossings
-from flowborne.kernels.node_distance import BAND
+from flowborne.kernels.node_distance import BAND, NEAR
 from flowborne.kernels.skin import cross_skin, sample_skin, skin_box, skin_weights
 from flowborne.solids.flesh import Flesh
 
@@ -58,6 +58,7 @@ def skins_on(
     if flesh is None:
         return Skins((), np.zeros((0, 3)), vertices, np.zeros((0, 3), np.int64))
     thinnest = 2.0 * WATERTIGHT[grid.is_slab] * grid.spacing
+    near = BAND if grid.is_slab else NEAR + 1.0  # so far are the corners of faces that are near
     pieces, middles = [], []
     for f, triangles in enumerate(flesh.skins):
         inside = vertices[flesh.outer[f]]
@@ -70,7 +71,7 @@ def skins_on(
                 box[2] = 0, 2
             if np.any(box[:, 1] - box[:, 0] < 2):
                 continue
-            phi = sample_skin(vertices, triangles, box, image.nodes, BAND)
+            phi = sample_skin(vertices, triangles, box, image.nodes, near + more / grid.spacing)
             found = new_crossings(phi, grid.spacing, grid.is_slab)
             if more == 0.0:
                 skin = vertices, triangles, (-1 - f) * PIECES + flesh.sheets[flesh.of_surface == f]
