@@ -163,12 +163,14 @@ def water_of(
         spans = [np.arange(low, high + 1.0) for low, high in zip(*ends, strict=True)]
         if grid.is_slab:
             spans[2] = middle[2:] = np.zeros(1)
-        at = np.stack(np.meshgrid(*spans, indexing="ij"), axis=-1).reshape(-1, 3)
-        gap = h * (at - middle)
-        height = gap @ along
-        across = np.linalg.norm(gap - height[:, None] * along, axis=1)
+        gap = np.ix_(*[h * (span - m) for span, m in zip(spans, middle, strict=True)])
+        height = gap[0] * along[0] + gap[1] * along[1] + gap[2] * along[2]
+        x, y, z = (g - height * n for g, n in zip(gap, along, strict=True))
+        across = np.sqrt(x * x + y * y + z * z)
         part = (1.0 - np.abs(height) / h).clip(0.0) * (0.5 + (radius - across) / h).clip(0.0, 1.0)
-        at, part = at[part > 0.0].astype(np.int64), part[part > 0.0]
+        found = np.nonzero(part)
+        at = np.stack([s[n] for s, n in zip(spans, found, strict=True)], axis=1).astype(np.int64)
+        part = part[found]
         whole += grid.cell_volume * part.sum()
         low, high = np.where(offset == 0.0, 1, 0), np.array(grid.shape) - 1
         inside = ((period > 0) | ((at >= low) & (at <= high))).all(axis=1)
