@@ -31,6 +31,7 @@ from flowborne.fluid.grid import Grid
 from flowborne.fluid.sides.far import Strength
 from flowborne.kernels.arrays import Array, Faces, Integers
 from flowborne.solids.dynamics import Kinematics
+from flowborne.solids.scratch import cross
 
 
 @dataclass(frozen=True)
@@ -100,7 +101,7 @@ class Disc:
         """W that the water and the body get, with this velocity of the fluid (m/s), and that of the
         bodies (nv,)."""
         twist = pose.twist_jacobian[self.thruster.body] @ v
-        through = self.along @ (twist[:3] + np.cross(twist[3:], self.centre))
+        through = self.along @ (twist[:3] + cross(twist[3:], self.centre))
         for axis, (faces, shares) in enumerate(zip(self.faces, self.shares, strict=True)):
             through -= self.along[axis] * (shares @ velocity[axis].reshape(-1)[faces])
         return float(self.thrust * through)
@@ -200,5 +201,5 @@ def thrust_wrench(discs: tuple[Disc, ...], nbody: int) -> Array:
     wrench = np.zeros((nbody, 6))
     for disc in discs:
         force = disc.thrust * disc.along
-        wrench[disc.thruster.body] += np.concatenate([force, np.cross(disc.centre, force)])
+        wrench[disc.thruster.body] += np.concatenate([force, cross(disc.centre, force)])
     return wrench

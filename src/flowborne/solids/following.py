@@ -9,6 +9,7 @@ from flowborne.solids.dynamics import Kinematics, kinematics
 from flowborne.solids.model import SolidModel, SolidState
 from flowborne.solids.momentum import mass_matrix, mass_times
 from flowborne.solids.prescribed import symmetric_inverse
+from flowborne.solids.scratch import cross
 
 
 def follow(model: SolidModel, q: Array, change: Array) -> Array:
@@ -54,7 +55,7 @@ def follow_each(model: SolidModel, q: Array) -> tuple[Integers, Array]:
 def _followed(model: SolidModel, pose: Kinematics, change: Array) -> Array:
     assert model.flesh is not None
     twist = model.flesh.carried @ (pose.twist_jacobian @ change)
-    moving = twist[:, :3] + np.cross(twist[:, 3:], pose.vertices)
+    moving = twist[:, :3] + cross(twist[:, 3:], pose.vertices)
     return np.where(model.flesh.dofs, model.flesh.of_vertices(moving), change)
 
 
