@@ -155,23 +155,23 @@ def water_of(
     part of the momentum.
     """
     h, radius = grid.spacing, max(radius, 0.5 * grid.spacing)
-    reach, period = radius + h, np.array(grid.shape) * np.array(sides.periodic())
+    reach, period = (radius + h) / h, np.array(grid.shape) * np.array(sides.periodic())
+    offset = np.where(np.eye(3), 0.0, 0.5)[list(grid.axes)]
+    middle = (centre - np.array(grid.origin)) / h - offset
+    ends = np.floor(middle.min(axis=0) - reach), np.ceil(middle.max(axis=0) + reach)
+    spans = [np.arange(low, high + 1.0) for low, high in zip(*ends, strict=True)]
+    if grid.is_slab:
+        spans[2], middle[:, 2] = np.zeros(1), 0.0
+    near = np.stack(np.meshgrid(*spans, indexing="ij"), axis=-1).reshape(-1, 3)
+    gap = h * (near - middle[:, None])
+    height = gap @ along
+    across = np.linalg.norm(gap - height[..., None] * along, axis=-1)
+    parts = (1.0 - np.abs(height) / h).clip(0.0) * (0.5 + (radius - across) / h).clip(0.0, 1.0)
+    high, least = np.array(grid.shape) - 1, np.where(offset == 0.0, 1, 0)
     faces, shares, whole, wet = [], [], 0.0, 0.0
-    for axis in grid.axes:
-        offset = np.where(np.arange(3) == axis, 0.0, 0.5)
-        middle = (centre - np.array(grid.origin)) / h - offset
-        ends = np.floor(middle - reach / h), np.ceil(middle + reach / h)
-        spans = [np.arange(low, high + 1.0) for low, high in zip(*ends, strict=True)]
-        if grid.is_slab:
-            spans[2] = middle[2:] = np.zeros(1)
-        at = np.stack(np.meshgrid(*spans, indexing="ij"), axis=-1).reshape(-1, 3)
-        gap = h * (at - middle)
-        height = gap @ along
-        across = np.linalg.norm(gap - height[:, None] * along, axis=1)
-        part = (1.0 - np.abs(height) / h).clip(0.0) * (0.5 + (radius - across) / h).clip(0.0, 1.0)
-        at, part = at[part > 0.0].astype(np.int64), part[part > 0.0]
+    for axis, part, low in zip(grid.axes, parts, least, strict=True):
+        at, part = near[part > 0.0].astype(np.int64), part[part > 0.0]
         whole += grid.cell_volume * part.sum()
-        low, high = np.where(offset == 0.0, 1, 0), np.array(grid.shape) - 1
         inside = ((period > 0) | ((at >= low) & (at <= high))).all(axis=1)
         at, part = np.where(period > 0, at % np.maximum(period, 1), at)[inside], part[inside]
         flat = np.ravel_multi_index(tuple(at.T), grid.face_shape(axis))
