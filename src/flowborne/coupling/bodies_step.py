@@ -22,7 +22,7 @@ from flowborne.fluid.transport import parts_for
 from flowborne.kernels.arrays import Array
 from flowborne.solids.driven import Driven, drive
 from flowborne.solids.dynamics import kinematics
-from flowborne.solids.following import follow
+from flowborne.solids.following import followed
 from flowborne.solids.model import SolidState
 from flowborne.solids.motors import Controls, advanced, motors
 from flowborne.solids.prescribed import PrescribedSystem
@@ -45,8 +45,9 @@ def position_velocity(world: World, command: JointCommand) -> Array:
     model, q, v = world.setup.solid, world.solid.q, world.solid.v
     exact = command.prescribed & ~np.isfinite(command.torque_limit)
     velocity = np.where(exact, command.rate, v)
-    if model.flesh is not None:
-        velocity = np.where(exact, velocity, v + follow(model, q, velocity - v))
+    if model.flesh is not None and (velocity != v).any():
+        pose = kinematics(model, q) if world.setup.fluid is None else pose_and_cut(world)[0]
+        velocity = np.where(exact, velocity, v + followed(model, pose, velocity - v))
     return velocity
 
 

@@ -29,9 +29,10 @@ def joint_command(world: World, dt: float, command: JointCommand | None) -> Join
             command.set(motion.dofs, v, final_velocity, limit)
         else:
             rate, span = gap_to(world, motion, end) / dt, 2.0 * world.ahead
-            final_velocity = motion.velocity(end)
             if span > 0.0:
                 final_velocity = velocity_after(model, world.solid.q, motion, end, span)
+            else:
+                final_velocity = motion.velocity(end)
             command.set(motion.dofs, rate, final_velocity)
     command.prescribed[told.pushed] = False
     if model.locked.any():

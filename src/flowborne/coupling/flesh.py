@@ -44,8 +44,7 @@ def piece_of(body: int, grid: Grid, box: Integers, phi: Array, crossings: Crossi
 
     grid  displaced such that the body itself is there
     """
-    inside = box[:, 1] - box[:, 0] - 1
-    sizes = [inside + (np.arange(3) == d) for d in range(3)]
+    sizes = (box[:, 1] - box[:, 0] - 1 + np.eye(3, dtype=np.int64)).tolist()
     share = faces_of([np.zeros(size) for size in sizes])
     centre = faces_of([np.zeros((2, *size)) for size in sizes])
     return Piece(body, box, grid.nodes, phi, crossings, share, centre)

@@ -109,14 +109,13 @@ def around_bodies(
     boxes  see `body_boxes`
     """
     placed, shape = shapes.placed(position, rotation), np.array(grid.shape)
-    for body in np.unique(shapes.body):
-        geoms = np.flatnonzero(shapes.body == body)
+    for body, geoms in shapes.geoms.items():
         for image in displaced(grid, boundaries, *boxes[body]):
             box = node_box(geoms, position, rotation, shapes.reach, image.nodes, shape)
             if grid.is_slab:
                 box[2] = 0, 2
             if np.all(box[:, 1] - box[:, 0] >= 2):
-                yield piece_of_body(int(body), shapes, placed, geoms, box, image)
+                yield piece_of_body(body, shapes, placed, geoms, box, image)
     yield from skins.pieces
 
 
@@ -125,18 +124,18 @@ def piece_of_body(
 ) -> Piece:
     """A body on a grid: the union of its geometries."""
     skinned = [g for g in geoms if g in shapes.skins]
-    plain = np.array([g for g in geoms if g not in shapes.skins or shapes.sheets[g]], np.int64)
-    phi = sampled(placed, np.setdiff1d(geoms, skinned), box, grid)
+    phi = sampled(placed, [g for g in geoms if g not in shapes.skins], box, grid)
     for g in skinned:
         np.minimum(phi, skin_distance(shapes, placed, g, box, grid), out=phi)
     found = new_crossings(phi, grid.spacing, grid.is_slab)
-    used = np.zeros(1, np.int64)
-    for g in plain:
-        cross_geometry(found, used, phi, box, placed[g], int(g), grid.nodes)
+    used, nodes = np.zeros(1, np.int64), grid.nodes
+    for g in geoms:
+        if g not in shapes.skins or shapes.sheets[g]:
+            cross_geometry(found, used, phi, box, placed[g], int(g), nodes)
     for g in skinned:
         pieces = int(g) * PIECES + shapes.pieces[g]
         skin = at_place(shapes, placed, g), shapes.skins[g][1], pieces
-        cross_skin(found, used, phi, *skin, box, grid.nodes)
+        cross_skin(found, used, phi, *skin, box, nodes)
     return piece_of(body, grid, box, phi, found)
 
 
@@ -144,9 +143,9 @@ def body_boxes(shapes: Shapes, position: Array, rotation: Array, bodies: int) ->
     """(bodies, 2, 3) lowest and highest corner of the box around each body's geometries, m; 0 of a
     body without any."""
     reach, boxes = np.einsum("gij,gj->gi", np.abs(rotation), shapes.reach), np.zeros((bodies, 2, 3))
-    for body in np.unique(shapes.body):
-        own = shapes.body == body
-        boxes[body] = (position - reach)[own].min(axis=0), (position + reach)[own].max(axis=0)
+    low, high = position - reach, position + reach
+    for body, own in shapes.geoms.items():
+        boxes[body] = low[own].min(axis=0), high[own].max(axis=0)
     return boxes
 
 
@@ -156,7 +155,7 @@ def join_ends(values: Array, axis: int) -> None:
     values[first] = values[last] = np.minimum(values[first], values[last])
 
 
-def sampled(placed: list[Placed], geoms: Integers, box: Integers, grid: Grid) -> Array:
+def sampled(placed: list[Placed], geoms: list[int], box: Integers, grid: Grid) -> Array:
     """(box shape) distance to the nearest of some geometries at the nodes of a box, m."""
     phi = np.full(box[:, 1] - box[:, 0], BAND * grid.spacing)
     for g in geoms:
@@ -182,7 +181,7 @@ def skin_distance(
     near = sample_skin(vertices, faces, box, grid.nodes, band)
     if grid.is_slab:
         return near
-    far = sampled(placed, np.array([geom]), box, grid)
+    far = sampled(placed, [geom], box, grid)
     beyond = np.copysign(np.maximum(np.abs(far), NEAR * h), near)
     found = np.where(np.abs(near) < NEAR * h, near, beyond)
     return np.minimum(found, far) if shapes.sheets[geom] else found
@@ -229,17 +228,16 @@ def geometry(
         first += piece.crossings.part.size
         for d in grid.axes:
             close_faces(piece, total[d], d)
-    none = np.zeros(0, np.int64)
-    listed = [(none, none, none, np.zeros(0), np.zeros((0, 2)))]
+    listed, of = [(np.zeros(0, np.int64), np.zeros(0), np.zeros((0, 2)))], [(0, 0)]
     for piece in pieces:
         for d in grid.axes:
             faces = opened[d], total[d], distance, crossings, beside
-            face, closed, centre = share_closed(piece, *faces, d, normal[d])
-            axis, part_body = np.full(face.size, d), np.full(face.size, piece.body)
-            listed.append((axis, face, part_body, closed, centre))
+            listed.append(share_closed(piece, *faces, d, normal[d]))
+            of.append((d, piece.body))
     for d in around:
         join_ends(opened[d], d)
-    axis, face, part_body, closed, centre = map(np.concatenate, zip(*listed, strict=True))
+    face, closed, centre = map(np.concatenate, zip(*listed, strict=True))
+    axis, part_body = np.repeat(np.transpose(of), [part.size for _, part, _ in listed], axis=1)
     kind = kinds_of_cells(ox, oy, oz, normal, boxes)
     with_rows = kind >= NARROW
     bones = [piece for piece in pieces if piece.body < first_skin]
@@ -283,14 +281,15 @@ def geometry(
 
 def bone_rows(bones: list[Piece], listed: Mask) -> Rows:
     """Rows of J of bones in listed cells (nx, ny, nz)."""
-    cells, columns, values = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)], [np.zeros(0)]
+    none = np.zeros((0, 6), np.int64)
+    cells, columns, values = [np.zeros(0, np.int64)], [none], [np.zeros((0, 6))]
     for bone in bones:
         own, wrench = list_cells(bone, listed)
         cells.append(own)
-        columns.append(np.tile(6 * bone.body + np.arange(6), own.size))
-        values.append(wrench.ravel())
-    found = np.concatenate(cells)
-    return found, 6 * np.arange(found.size + 1), np.concatenate(columns), np.concatenate(values)
+        columns.append(np.full(wrench.shape, 6 * bone.body + np.arange(6)))
+        values.append(wrench)
+    found, column, value = np.concatenate(cells), np.concatenate(columns), np.concatenate(values)
+    return found, 6 * np.arange(found.size + 1), column.ravel(), value.ravel()
 
 
 def joined(rows: Rows, more: Rows) -> Rows:

@@ -34,6 +34,7 @@ from flowborne.kernels.arrays import Array, Integers, Mask
 from flowborne.kernels.carry import Inlets, share_at_faces
 from flowborne.kernels.lists import merged
 from flowborne.solids.dynamics import Kinematics
+from flowborne.solids.scratch import cross
 
 DEPTH = 3.0
 """Cells along a mouth, beyond its radius, within which skin may belong to it."""
@@ -124,7 +125,7 @@ def jet_of(mouth: Mouth, cut: Geometry, pose: Kinematics, v: Array, grid: Grid, 
         centre,
         along,
         rate / mouth.area(grid.is_slab) * along,
-        twist[:3] + np.cross(twist[3:], centre),
+        twist[:3] + cross(twist[3:], centre),
         cells[here],
         rate * skin[here] / skin.sum(),
     )
@@ -195,7 +196,7 @@ def jet_wrench(jets: tuple[Jet, ...], density: float, nbody: int) -> Array:
     wrench = np.zeros((nbody, 6))
     for jet in jets:
         force = -density * jet.rate * jet.velocity
-        wrench[jet.mouth.body] += np.concatenate([force, np.cross(jet.centre, force)])
+        wrench[jet.mouth.body] += np.concatenate([force, cross(jet.centre, force)])
     return wrench
 
 

@@ -20,6 +20,7 @@ from flowborne.base.errors import BreakdownError, PartError, WorkerError
 from flowborne.base.one_line import one_line
 from flowborne.coupling.world import World
 from flowborne.kernels.arrays import Array, Integers
+from flowborne.solids.scratch import cross
 from flowborne.solids.sensed import Sensed
 
 BREAKDOWNS = ArithmeticError, np.linalg.LinAlgError, BreakdownError, PartError, WorkerError
@@ -253,7 +254,7 @@ class StepReport:
 def about(wrench: Array, points: Array) -> Array:
     """(n, 6) wrenches about the world origin as wrenches about points (n, 3)."""
     force, torque = wrench[:, :3], wrench[:, 3:]
-    return np.concatenate([force, torque - np.cross(points, force)], axis=1)
+    return np.concatenate([force, torque - cross(points, force)], axis=1)
 
 
 def joined(reports: Sequence[StepReport]) -> StepReport:

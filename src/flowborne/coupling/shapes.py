@@ -57,6 +57,11 @@ class Shapes:
         return [Placed(*each) for each in zip(*own, strict=True)]
 
     @cached_property
+    def geoms(self) -> dict[int, Integers]:
+        """Body -> its geometries, ascending."""
+        return {int(body): np.flatnonzero(self.body == body) for body in np.unique(self.body)}
+
+    @cached_property
     def tips(self) -> Array:
         """(ng, 8, 3) corners of the bounding box of each in its own frame, m; of a sphere, which
         turns on the spot, its centre."""

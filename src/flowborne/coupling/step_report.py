@@ -24,6 +24,7 @@ from flowborne.solids.dynamics import Kinematics
 from flowborne.solids.flesh import Flesh
 from flowborne.solids.model import SolidModel
 from flowborne.solids.momentum import halfway_momentum
+from flowborne.solids.scratch import cross
 
 WRENCHES = [name for name in FIELDS if name.endswith("_wrench")]
 UNKNOWN = {
@@ -170,7 +171,7 @@ def on_bodies(pose: Kinematics, flesh: Flesh | None, push: Array) -> Array:
         return push.reshape(-1, 6)
     first = push.size - pose.vertices.size
     force = push[first:].reshape(-1, 3)
-    wrench = np.concatenate([force, np.cross(pose.vertices, force)], axis=1)
+    wrench = np.concatenate([force, cross(pose.vertices, force)], axis=1)
     return push[:first].reshape(-1, 6) + flesh.carried.T @ wrench
 
 

@@ -31,6 +31,7 @@ from flowborne.fluid.grid import Grid
 from flowborne.fluid.sides.far import Strength
 from flowborne.kernels.arrays import Array, Faces, Integers
 from flowborne.solids.dynamics import Kinematics
+from flowborne.solids.scratch import cross
 
 
 @dataclass(frozen=True)
@@ -100,7 +101,7 @@ class Disc:
         """W that the water and the body get, with this velocity of the fluid (m/s), and that of the
         bodies (nv,)."""
         twist = pose.twist_jacobian[self.thruster.body] @ v
-        through = self.along @ (twist[:3] + np.cross(twist[3:], self.centre))
+        through = self.along @ (twist[:3] + cross(twist[3:], self.centre))
         for axis, (faces, shares) in enumerate(zip(self.faces, self.shares, strict=True)):
             through -= self.along[axis] * (shares @ velocity[axis].reshape(-1)[faces])
         return float(self.thrust * through)
@@ -154,25 +155,23 @@ def water_of(
     part of the momentum.
     """
     h, radius = grid.spacing, max(radius, 0.5 * grid.spacing)
-    reach, period = radius + h, np.array(grid.shape) * np.array(sides.periodic())
+    reach, period = (radius + h) / h, np.array(grid.shape) * np.array(sides.periodic())
+    offset = np.where(np.eye(3), 0.0, 0.5)[list(grid.axes)]
+    middle = (centre - np.array(grid.origin)) / h - offset
+    ends = np.floor(middle.min(axis=0) - reach), np.ceil(middle.max(axis=0) + reach)
+    spans = [np.arange(low, high + 1.0) for low, high in zip(*ends, strict=True)]
+    if grid.is_slab:
+        spans[2], middle[:, 2] = np.zeros(1), 0.0
+    near = np.stack(np.meshgrid(*spans, indexing="ij"), axis=-1).reshape(-1, 3)
+    gap = h * (near - middle[:, None])
+    height = gap @ along
+    across = np.linalg.norm(gap - height[..., None] * along, axis=-1)
+    parts = (1.0 - np.abs(height) / h).clip(0.0) * (0.5 + (radius - across) / h).clip(0.0, 1.0)
+    high, least = np.array(grid.shape) - 1, np.where(offset == 0.0, 1, 0)
     faces, shares, whole, wet = [], [], 0.0, 0.0
-    for axis in grid.axes:
-        offset = np.where(np.arange(3) == axis, 0.0, 0.5)
-        middle = (centre - np.array(grid.origin)) / h - offset
-        ends = np.floor(middle - reach / h), np.ceil(middle + reach / h)
-        spans = [np.arange(low, high + 1.0) for low, high in zip(*ends, strict=True)]
-        if grid.is_slab:
-            spans[2] = middle[2:] = np.zeros(1)
-        gap = np.ix_(*[h * (span - m) for span, m in zip(spans, middle, strict=True)])
-        height = gap[0] * along[0] + gap[1] * along[1] + gap[2] * along[2]
-        x, y, z = (g - height * n for g, n in zip(gap, along, strict=True))
-        across = np.sqrt(x * x + y * y + z * z)
-        part = (1.0 - np.abs(height) / h).clip(0.0) * (0.5 + (radius - across) / h).clip(0.0, 1.0)
-        found = np.nonzero(part)
-        at = np.stack([s[n] for s, n in zip(spans, found, strict=True)], axis=1).astype(np.int64)
-        part = part[found]
+    for axis, part, low in zip(grid.axes, parts, least, strict=True):
+        at, part = near[part > 0.0].astype(np.int64), part[part > 0.0]
         whole += grid.cell_volume * part.sum()
-        low, high = np.where(offset == 0.0, 1, 0), np.array(grid.shape) - 1
         inside = ((period > 0) | ((at >= low) & (at <= high))).all(axis=1)
         at, part = np.where(period > 0, at % np.maximum(period, 1), at)[inside], part[inside]
         flat = np.ravel_multi_index(tuple(at.T), grid.face_shape(axis))
@@ -202,5 +201,5 @@ def thrust_wrench(discs: tuple[Disc, ...], nbody: int) -> Array:
     wrench = np.zeros((nbody, 6))
     for disc in discs:
         force = disc.thrust * disc.along
-        wrench[disc.thruster.body] += np.concatenate([force, np.cross(disc.centre, force)])
+        wrench[disc.thruster.body] += np.concatenate([force, cross(disc.centre, force)])
     return wrench

@@ -1,7 +1,7 @@
 """Formulas of a scene in the time t, with their exact derivative.
 
 A formula has Python syntax but is never executed as Python: its syntax tree may contain only
-numbers, names, arithmetic and calls of a few functions. It is evaluated in dual numbers.
+numbers, names, arithmetic and calls of a few functions. It becomes functions of dual numbers.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import math
 import operator
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 from textwrap import shorten
 
 from flowborne.base.errors import SceneError
@@ -133,6 +134,9 @@ FUNCTIONS: Mapping[str, tuple[Callable[..., Dual], int, float]] = {
 RESERVED = ("t", "pi", *FUNCTIONS)
 """Names that are not allowed for constants."""
 
+MAX_TIMES = 2
+"""Times for which a formula caches its value: a step needs those at its end and a step later."""
+
 MAX_SHOWN = 80
 """Largest number of characters of a formula in a message."""
 
@@ -155,11 +159,14 @@ class Formula:
     text: str
     constants: Mapping[str, float] = field(default_factory=dict)
     _tree: ast.expr = field(init=False, repr=False, compare=False)
+    _value: Callable[[float], Dual] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         try:
             tree = ast.parse(" ".join(self.text.split()), mode="eval").body
             self._check(tree)
+            known = {name: Dual(value) for name, value in self.constants.items()}
+            value = _function(tree, known | {"pi": Dual(math.pi)})
         except SyntaxError:
             raise SceneError(f"{self} cannot be read. {GRAMMAR}") from None
         except (RecursionError, MemoryError, OverflowError):
@@ -167,6 +174,10 @@ class Formula:
                 f"{self} is nested too deep, or has too large a number. Simplify it."
             ) from None
         object.__setattr__(self, "_tree", tree)
+        object.__setattr__(self, "_value", lru_cache(MAX_TIMES)(value))
+
+    def __reduce__(self) -> tuple[type[Formula], tuple[str, Mapping[str, float]]]:
+        return Formula, (self.text, self.constants)
 
     def __str__(self) -> str:
         return f"formula '{shorten(self.text, MAX_SHOWN)}'"
@@ -178,10 +189,8 @@ class Formula:
 
     def at(self, time: float) -> Dual:
         """Value and derivative at `time` (s). Raises ArithmeticError if one is not finite."""
-        known = {name: Dual(value) for name, value in self.constants.items()}
-        known |= {"t": Dual(time, 1.0), "pi": Dual(math.pi)}
         try:
-            result = _value(self._tree, known)
+            result = self._value(time)
         except (ArithmeticError, ValueError):
             result = Dual(math.nan)
         if not (math.isfinite(result.value) and math.isfinite(result.slope)):
@@ -224,17 +233,26 @@ class Formula:
             raise SceneError(f"{self} gives '{name}' {count} arguments. Give it {fewest}{other}.")
 
 
-def _value(node: ast.expr, known: Mapping[str, Dual]) -> Dual:
-    """Value of a checked tree; `known` holds the values of its names."""
+def _function(node: ast.expr, known: Mapping[str, Dual]) -> Callable[[float], Dual]:
+    """A checked tree as a function of time (s); `known` holds the values of all names but t."""
     match node:
         case ast.BinOp():
-            return OPERATORS[type(node.op)](_value(node.left, known), _value(node.right, known))
+            combine = OPERATORS[type(node.op)]
+            left, right = _function(node.left, known), _function(node.right, known)
+            return lambda time: combine(left(time), right(time))
         case ast.UnaryOp():
-            return SIGNS[type(node.op)](_value(node.operand, known))
+            sign, operand = SIGNS[type(node.op)], _function(node.operand, known)
+            return lambda time: sign(operand(time))
         case ast.Call(func=ast.Name(id=name)):
-            return FUNCTIONS[name][0](*(_value(argument, known) for argument in node.args))
+            apply = FUNCTIONS[name][0]
+            arguments = [_function(argument, known) for argument in node.args]
+            return lambda time: apply(*[argument(time) for argument in arguments])
+        case ast.Name(id="t"):
+            return lambda time: Dual(time, 1.0)
         case ast.Name():
-            return known[node.id]
+            value = known[node.id]
+            return lambda _: value
         case ast.Constant():
-            return Dual(float(node.value))  # type: ignore[arg-type]
+            number = Dual(float(node.value))  # type: ignore[arg-type]
+            return lambda _: number
     raise AssertionError(ast.dump(node))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -166,7 +167,7 @@ class Columns:
         Without a controller there is no objective, which is then nan.
         """
         known = set() if self._controller is not None else {"objective"}
-        names = [c for c, value in values.items() if c not in known and not np.isfinite(value)]
+        names = [c for c, value in values.items() if c not in known and not math.isfinite(value)]
         return ", ".join(names[:LISTED]) + (" and more" if len(names) > LISTED else "")
 
     def strength_steps(self, frame_time: float) -> dict[str, float]:

@@ -14,6 +14,7 @@ from flowborne.kernels.arrays import Array
 from flowborne.solids.dynamics import Kinematics
 from flowborne.solids.geoms import kind_of, quaternion_of
 from flowborne.solids.model import SolidModel
+from flowborne.solids.scratch import cross
 
 COEFFICIENTS = slice(1, 6)
 """Of `fluidcoef`, in a row of MuJoCo's `geom_fluid` after the switch."""
@@ -66,7 +67,7 @@ class EllipsoidModel:
         rotation = pose.body_rotation[self.bodies]
         twist = pose.twist_jacobian[self.bodies] @ velocity
         turn = twist[:, 3:]
-        linear = twist[:, :3] + np.cross(turn, at)
+        linear = twist[:, :3] + cross(turn, at)
         quaternions = [quaternion_of(own) for own in rotation]
         data.qpos[:] = np.hstack([at, np.reshape(quaternions, (-1, 4))]).ravel()
         data.qvel[:] = np.hstack([linear, np.einsum("bji,bj->bi", rotation, turn)]).ravel()

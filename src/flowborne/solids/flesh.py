@@ -129,12 +129,17 @@ class Flesh:
     def of_vertices(self, velocity: Array) -> Array:
         """(nv,) velocity of the free nodes from that of the vertices (n, 3)."""
         carried = self.weights.T @ velocity / self.weights.sum(axis=0)[:, None]
-        point, dof = self.moved
-        own = self.dofs[dof]
+        dof, node, axis = self._free
         spread = np.zeros(self.model.mj.nv)
-        axis = self.model.mj.jnt_axis[self.model.mj.dof_jntid[dof[own]]]
-        spread[dof[own]] = (axis * carried[point[own]]).sum(axis=1)
+        spread[dof] = (axis * carried[node]).sum(axis=1)
         return spread
+
+    @cached_property
+    def _free(self) -> tuple[Integers, Integers, Array]:
+        """(k,) dofs of free nodes, (k,) the node that each moves, and (k, 3) along which axis."""
+        node, dof = self.moved
+        own = self.dofs[dof]
+        return dof[own], node[own], self.model.mj.jnt_axis[self.model.mj.dof_jntid[dof[own]]]
 
     @cached_property
     def positions(self) -> Mask:

@@ -9,6 +9,7 @@ from flowborne.solids.dynamics import Kinematics, kinematics
 from flowborne.solids.model import SolidModel, SolidState
 from flowborne.solids.momentum import mass_matrix, mass_times
 from flowborne.solids.prescribed import symmetric_inverse
+from flowborne.solids.scratch import cross
 
 
 def follow(model: SolidModel, q: Array, change: Array) -> Array:
@@ -19,7 +20,7 @@ def follow(model: SolidModel, q: Array, change: Array) -> Array:
     """
     if model.flesh is None or not change.any():
         return change
-    return _followed(model, kinematics(model, q), change)
+    return followed(model, kinematics(model, q), change)
 
 
 def posed_flesh(model: SolidModel, q: Array) -> Array:
@@ -48,13 +49,14 @@ def follow_each(model: SolidModel, q: Array) -> tuple[Integers, Array]:
     bones = np.flatnonzero(~model.flesh.dofs)
     pose, unit = kinematics(model, q), np.zeros((bones.size, model.nv))
     unit[np.arange(bones.size), bones] = 1.0
-    return bones, np.stack([_followed(model, pose, row) for row in unit], axis=1)
+    return bones, np.stack([followed(model, pose, row) for row in unit], axis=1)
 
 
-def _followed(model: SolidModel, pose: Kinematics, change: Array) -> Array:
+def followed(model: SolidModel, pose: Kinematics, change: Array) -> Array:
+    """As `follow`, of a model with flesh in a pose."""
     assert model.flesh is not None
     twist = model.flesh.carried @ (pose.twist_jacobian @ change)
-    moving = twist[:, :3] + np.cross(twist[:, 3:], pose.vertices)
+    moving = twist[:, :3] + cross(twist[:, 3:], pose.vertices)
     return np.where(model.flesh.dofs, model.flesh.of_vertices(moving), change)
 
 

@@ -13,6 +13,7 @@ from flowborne.base.phrases import suggestion
 from flowborne.kernels.arrays import Array
 from flowborne.solids.dynamics import Kinematics
 from flowborne.solids.model import SolidModel
+from flowborne.solids.scratch import cross
 
 Frame = Literal["world", "body"]
 Components = tuple[float, float, float] | Callable[[float], Array]
@@ -49,7 +50,7 @@ class Force:
         at = kinematics.mass_centre[body]
         if self.point is not None:
             at = kinematics.body_position[body] + turn @ np.array(self.point)
-        wrench[body] = np.concatenate([force, torque + np.cross(at, force)])
+        wrench[body] = np.concatenate([force, torque + cross(at, force)])
         return wrench
 
 

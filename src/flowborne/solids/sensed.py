@@ -17,6 +17,7 @@ from flowborne.base.one_line import one_line
 from flowborne.kernels.arrays import Array
 from flowborne.solids.dynamics import Kinematics, kinematics
 from flowborne.solids.model import SolidModel
+from flowborne.solids.scratch import cross
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,4 +176,4 @@ OF_STEP = ("velocity", "acceleration", "dt", "actuator", "wrench")
 def central_twist(pose: Kinematics, velocity: Array, body: int) -> Array:
     """(6,) velocity of a body's centre of mass, and its angular velocity."""
     twist = pose.twist_jacobian[body] @ velocity
-    return np.append(twist[:3] + np.cross(twist[3:], pose.mass_centre[body]), twist[3:])
+    return np.append(twist[:3] + cross(twist[3:], pose.mass_centre[body]), twist[3:])
