@@ -152,11 +152,7 @@ def tangential_change(normal: Array, place: Place, component: int, periodic: boo
     returns   like the layer of the component's faces at the side; at both ends, where a face of
               the side is missing, as next to them
     """
-    steps = np.diff(normal, axis=component)
-    if periodic:
-        around = np.take(normal, [0], component) - np.take(normal, [-1], component)
-        steps = np.concatenate([around, steps, around], axis=component)
-    else:
-        wide = [(int(axis == component),) * 2 for axis in range(3)]
-        steps = np.pad(steps, wide, mode="edge")
-    return steps if place.upper else -steps
+    n = normal.shape[component]
+    face = np.arange(n + 1) if periodic else np.arange(n + 1).clip(1, n - 1)
+    above, below = (np.take(normal, cells, component, mode="wrap") for cells in (face, face - 1))
+    return above - below if place.upper else -(above - below)
