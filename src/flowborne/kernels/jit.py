@@ -170,7 +170,8 @@ class Kernel(Generic[P, R]):
         self.options = options
         self.outer = compiled(function, cache=True, **options)
         self.inner = compiled(function, no_cpython_wrapper=True, **options)
-        forget_constants(self.inner)
+        if "forceinline" not in options:
+            forget_constants(self.inner)
 
     def __call__(self, *args: P.args, **kwargs: P.kwargs) -> R:
         count = getattr(_thread, "most", 1)

@@ -64,7 +64,8 @@ class KernelFlags(Flags):
 
 
 def forget_constants(dispatcher: Any) -> None:
-    """Let a function be compiled for all numbers where another calls it with a constant."""
+    """Let a function be compiled for all numbers where another calls it with a constant. What is
+    inlined keeps constants: a loop from a place that may be below 0 is not vectorised."""
     template = dispatcher.get_call_template
 
     def without(args: tuple[Any, ...], kws: dict[str, Any]) -> Any:
