@@ -9,7 +9,7 @@ unknowns that constraints hold. A drag D that grows with the velocity makes it N
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache, lru_cache
+from functools import cache
 
 import numpy as np
 from scipy.sparse import csc_array, csr_array
@@ -60,20 +60,11 @@ class Mobility:
 def dense_mobility(matrix: Array) -> Mobility:
     """Of a dense A^-1 (k, k)."""
     whole = np.ascontiguousarray(matrix)
+    share, axes = np.linalg.eigh(whole) if whole.any() else (np.zeros(len(whole)), whole)
     none, few, start = np.zeros(0, np.int64), np.zeros(0, np.int32), np.zeros(1, np.int32)
     blocks = none, none, few, none, few
     arrays = whole, start, few, np.zeros(0), np.zeros(0), blocks, none, np.zeros((0, 0))
-    return Mobility(arrays, modes(whole.tobytes(), len(whole))[0])
-
-
-@lru_cache(maxsize=1)
-def modes(matrix: bytes, size: int) -> tuple[Array, Array, Array]:
-    """R with R R^T = M of full rank, R (R^T R)^-1, and a basis of what M does not move, for a
-    positive semidefinite M (size, size). Pressure and viscosity of a step have the same M."""
-    share, axes = np.linalg.eigh(np.frombuffer(matrix).reshape(size, size))
-    moving = share > ROUNDING * size * np.abs(share).max(initial=0.0)
-    root = np.sqrt(share[moving])
-    return axes[:, moving] * root, axes[:, moving] / root, axes[:, ~moving]
+    return Mobility(arrays, axes * np.sqrt(np.maximum(share, 0.0)))
 
 
 @cache
@@ -117,7 +108,11 @@ class DenseAnswer:
     """
 
     def __init__(self, mobility: Array, drag: Array) -> None:
-        self.root, self.lift, self.held = modes(mobility.tobytes(), len(mobility))
+        share, axes = np.linalg.eigh(mobility)
+        moving = share > ROUNDING * len(share) * np.abs(share).max()
+        self.root = axes[:, moving] * np.sqrt(share[moving])
+        self.lift = axes[:, moving] / np.sqrt(share[moving])
+        self.held = axes[:, ~moving]
         self.drag = drag
         self.inside = np.linalg.cholesky(np.eye(len(self.root.T)) + self.root.T @ drag @ self.root)
         part = np.linalg.solve(self.inside, self.root.T)
