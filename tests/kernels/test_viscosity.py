@@ -13,6 +13,7 @@ from flowborne.kernels.edge_crossings import new_crossings
 from flowborne.kernels.viscosity import (
     GIVEN,
     INACTIVE,
+    RUN,
     UNKNOWN,
     CutFaces,
     apply_component,
@@ -110,6 +111,44 @@ def test_links_of_uncut_faces_need_no_geometry() -> None:
         link_faces(faces, d, away, away, diagonal, link, given, False)
         assert set(np.unique(link)) == {0.0, 0.7}
         np.testing.assert_array_equal(np.moveaxis(link, d, 0)[:-1], 0.7)
+
+
+LONG = [(3, 5, 2 * RUN + 7), (RUN + 9, 2, RUN + 1), (RUN + 9, 2 * RUN, 1)]
+"""Shapes of faces with runs that are whole, cut short and one face long."""
+
+
+@pytest.mark.parametrize("shape", LONG)
+@pytest.mark.parametrize("periodic", [False, True])
+def test_links_far_from_bodies_are_alike_on_any_number_of_threads(
+    shape: tuple, periodic: bool
+) -> None:
+    """But where a velocity is given, here and there."""
+    random, away = np.random.default_rng(4), np.ones(shape)
+    kind = random.choice([INACTIVE, UNKNOWN, GIVEN], shape, p=[0.01, 0.985, 0.005]).astype(np.uint8)
+    nothing, velocity = np.full([n + 1 for n in shape], np.nan), random.standard_normal(shape)
+    edges = nothing, new_crossings(nothing, 1e-9, False)
+    cuts = np.full(shape, np.nan), np.full((2, *shape), np.nan), np.full(shape, np.nan)
+    axis = 0
+    for d in range(2 if shape[2] == 1 else 3):
+        count = shape[d] - int(periodic and d == axis)
+        k, u = (np.moveaxis(values, d, 0)[:count] for values in (kind, velocity))
+        ahead, pushed = np.roll(k, -1, axis=0), np.roll(u, -1, axis=0)
+        joined = (np.arange(count) < count - 1 + int(periodic)).reshape(-1, 1, 1)
+        linked = joined & (k == UNKNOWN) & (ahead == UNKNOWN)
+        here = joined & (k == UNKNOWN) & (ahead == GIVEN)
+        there = joined & (k == GIVEN) & (ahead == UNKNOWN)
+        expected = np.zeros((3, *np.moveaxis(kind, d, 0).shape))
+        expected[0, :count] = linked | here
+        expected[0, :count] += np.roll(linked | there, 1, axis=0)
+        expected[1, :count] = linked
+        expected[2, :count] = here * pushed + np.roll(there * u, 1, axis=0)
+        for kernel in (link_faces, link_faces.parallel):
+            found = [np.zeros(shape) for _ in range(3)]
+            faces = CutFaces(axis, kind, *edges, *cuts, 0.7)
+            kernel(faces, d, away, velocity, *found, periodic)
+            for one, other in zip(found, expected, strict=True):
+                assert other.any()
+                np.testing.assert_allclose(np.moveaxis(one, d, 0), 0.7 * other, atol=1e-14)
 
 
 @pytest.mark.parametrize(("shape", "normal", "axis"), CASES)
